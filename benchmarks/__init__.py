@@ -1,0 +1,1 @@
+"""Experiments and figures by one command; see ``legible --help``."""

@@ -1,0 +1,57 @@
+"""How kernels are compiled: numba, cached in a per-user folder, the same code readable and runnable as plain Python.
+
+Compiled code lies in ``$NUMBA_CACHE_DIR`` if the user set it, else in the user's cache folder (Linux:
+``~/.cache/legible-envs/numba``), never beside the package. Deleting the folder is always safe. With
+``NUMBA_DISABLE_JIT=1`` every kernel runs as plain Python.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numba
+from platformdirs import user_cache_path
+
+__all__ = ["cache_folder", "kernel"]
+
+_F = TypeVar("_F", bound=Callable[..., Any])
+
+
+@cache
+def cache_folder() -> Path | None:
+    """Folder of the compiled code, created on first use; None where nothing can be written (then nothing is cached)."""
+    root = os.environ.get("NUMBA_CACHE_DIR")
+    try:
+        folder = Path(root) if root else user_cache_path("legible-envs") / "numba" / _sources_digest()
+        folder.mkdir(parents=True, exist_ok=True)
+        return folder if os.access(folder, os.W_OK) else None
+    except OSError:
+        return None
+
+
+def _sources_digest() -> str:
+    """Digest of all sources of the package: numba does not notice that a kernel called from another file changed."""
+    digest = hashlib.sha256()
+    for path in sorted(Path(__file__).parent.rglob("*.py")):
+        stat = path.stat()
+        digest.update(f"{path.name}:{stat.st_mtime_ns}:{stat.st_size};".encode())
+    return digest.hexdigest()[:16]
+
+
+def kernel(function: _F) -> _F:
+    """Compile a function of plain arrays and numbers; see the module's docstring for where the result is kept."""
+    folder = cache_folder()
+    if folder is None:
+        return numba.njit(function)
+    # Numba reads this setting when a function is decorated; other people's functions must not see ours.
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(folder)
+    try:
+        return numba.njit(cache=True, error_model="numpy")(function)
+    finally:
+        numba.config.CACHE_DIR = before

@@ -1,0 +1,321 @@
+"""The kitchen as an immutable value: floor, counters, virtual obstacles and stations on a rectangular grid."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+from collections import deque
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from legible_envs.errors import LayoutError
+
+__all__ = [
+    "COUNTER",
+    "FLOOR",
+    "INGREDIENTS",
+    "OBSTACLE",
+    "STATION_CODES",
+    "STATION_TYPES",
+    "SYMBOLS",
+    "OvercookedLayout",
+]
+
+Cell = tuple[int, int]
+
+FLOOR: Final = 0
+COUNTER: Final = 1
+OBSTACLE: Final = 2
+STATION_TYPES: Final = ("tomato", "onion", "cabbage", "fish", "dish", "pot", "serving")
+INGREDIENTS: Final = STATION_TYPES[:4]
+STATION_CODES: Final[Mapping[str, int]] = {name: code for code, name in enumerate(STATION_TYPES, 3)}
+SYMBOLS: Final = " XVTOCFDPS"
+"""ASCII symbol of each cell code: floor, counter, virtual obstacle, then the stations in the order of STATION_TYPES."""
+
+_CODE_OF: Final = {symbol: code for code, symbol in enumerate(SYMBOLS)}
+_NEIGHBOURS: Final = ((-1, 0), (1, 0), (0, 1), (0, -1))
+_STRAY: Final = {".": " ", "_": " ", "#": "X"}
+MAX_SIDE: Final = 64
+
+
+class OvercookedLayout:
+    """A kitchen: any rectangular grid of floor, counters, virtual obstacles and stations.
+
+    A value: immutable, hashable, compared by content. It admits every kitchen that can be drawn (stations may repeat,
+    stand inside the room and have several access cells); the design rules of a search belong to
+    :class:`~legible_envs.overcooked.workspace.OvercookedWorkspace`.
+
+    ASCII: ``X`` counter, space floor, ``V`` virtual obstacle, ``T O C F D P S`` tomato, onion, cabbage, fish, dish, pot
+    and serving stations, ``1`` to ``9`` the players' starts (floor underneath).
+
+    Args:
+        cells: ``(H, W)`` cell codes: 0 floor, 1 counter, 2 virtual obstacle, 3.. stations in the order of
+            ``STATION_TYPES``.
+        starts: ``(row, col)`` floor cells where the players start. Empty: the first access cell of a serving station
+            (of any station, or the first floor cell, where there is none).
+
+    Raises:
+        LayoutError: Unknown codes, a start that is not a floor cell or is taken twice, no floor, or a side below 3 or
+            above 64 cells.
+
+    Example:
+        >>> kitchen = OvercookedLayout.from_ascii('''
+        ... XPXXX
+        ... O   T
+        ... X V X
+        ... D  1X
+        ... XXSXX''')
+        >>> kitchen.shape, kitchen.stations["pot"], kitchen.access("pot"), kitchen.starts
+        ((5, 5), (0, 1), ((1, 1),), ((3, 3),))
+    """
+
+    __slots__ = ("__dict__", "_cells", "_starts")
+
+    def __init__(self, cells: npt.ArrayLike, starts: Iterable[Sequence[int]] = ()) -> None:
+        array = np.array(cells)
+        if array.ndim != 2:
+            raise LayoutError(f"cells must be a 2-D array (rows, columns), got shape {array.shape}", rule="shape")
+        if not (3 <= array.shape[0] <= MAX_SIDE and 3 <= array.shape[1] <= MAX_SIDE):
+            raise LayoutError(f"both sides must have 3 to {MAX_SIDE} cells, got {array.shape}", rule="shape")
+        bad = ~np.isin(array, np.arange(len(SYMBOLS)))
+        if bad.any():
+            row, col = (int(i) for i in np.argwhere(bad)[0])
+            raise LayoutError(
+                f"row {row}, column {col}: unknown cell code {array[row, col]!r}; expected 0..{len(SYMBOLS) - 1}",
+                rule="symbol",
+                cell=(row, col),
+            )
+        self._cells = array.astype(np.int8)
+        self._cells.setflags(write=False)
+        if not (self._cells == FLOOR).any():
+            raise LayoutError("the kitchen has no floor cell to stand on", rule="floor")
+        self._starts = self._checked_starts(starts)
+
+    def _checked_starts(self, starts: Iterable[Sequence[int]]) -> tuple[Cell, ...]:
+        checked: list[Cell] = []
+        for number, start in enumerate(starts, 1):
+            row, col = (int(i) for i in start)
+            if not (0 <= row < self.shape[0] and 0 <= col < self.shape[1]) or self._cells[row, col] != FLOOR:
+                raise LayoutError(
+                    f"player {number} starts at row {row}, column {col}, which is not a free floor cell",
+                    rule="start",
+                    cell=(row, col),
+                )
+            if (row, col) in checked:
+                raise LayoutError(f"two players start at row {row}, column {col}", rule="start", cell=(row, col))
+            checked.append((row, col))
+        return tuple(checked) or (self._default_start(),)
+
+    def _default_start(self) -> Cell:
+        for kind in ("serving", *STATION_TYPES):
+            for name in self.named(kind):
+                if access := self.access(name):
+                    return access[0]
+        row, col = np.argwhere(self._cells == FLOOR)[0]
+        return int(row), int(col)
+
+    # -- reading and writing ----------------------------------------------------------------------------------------------
+
+    @classmethod
+    def from_ascii(cls, text: str) -> OvercookedLayout:
+        """Read a drawing, one line a row; blank lines before and after are dropped, common indentation is not.
+
+        Raises:
+            LayoutError: Ragged rows or unknown symbols, naming row and column; whatever the constructor rejects.
+        """
+        if not isinstance(text, str):
+            raise LayoutError(f"expected an ASCII drawing as a string, got {type(text).__name__}", rule="type")
+        return cls.from_rows([line.rstrip("\r") for line in text.strip("\r\n").split("\n")])
+
+    @classmethod
+    def from_rows(cls, rows: Sequence[str | Sequence[str]]) -> OvercookedLayout:
+        """Read a list of row strings, or a nested list of one-character symbols; see :meth:`from_ascii`."""
+        lines = [list(row) for row in rows]
+        if not lines or not lines[0]:
+            raise LayoutError("the drawing is empty", rule="shape")
+        width = len(lines[0])
+        codes = np.zeros((len(lines), width), dtype=np.int8)
+        starts: dict[int, Cell] = {}
+        for r, line in enumerate(lines):
+            if len(line) != width:
+                raise LayoutError(
+                    f"ragged drawing: row {r} has {len(line)} cells, row 0 has {width}", rule="ragged", cell=(r, 0)
+                )
+            for c, symbol in enumerate(line):
+                if symbol in _CODE_OF:
+                    codes[r, c] = _CODE_OF[symbol]
+                elif isinstance(symbol, str) and len(symbol) == 1 and symbol in "123456789":
+                    number = int(symbol)
+                    if number in starts:
+                        raise LayoutError(
+                            f"row {r}, column {c}: player {number} already starts at row {starts[number][0]}, "
+                            f"column {starts[number][1]}",
+                            rule="start",
+                            cell=(r, c),
+                        )
+                    starts[number] = (r, c)
+                else:
+                    hint = f" (did you mean {_STRAY[symbol]!r}?)" if symbol in _STRAY else ""
+                    raise LayoutError(
+                        f"row {r}, column {c}: unknown symbol {symbol!r}{hint}; expected one of {SYMBOLS!r} or a player's digit",
+                        rule="symbol",
+                        cell=(r, c),
+                    )
+        if sorted(starts) != list(range(1, len(starts) + 1)):
+            raise LayoutError(f"players must be numbered 1, 2, …; the drawing has {sorted(starts)}", rule="start")
+        return cls(codes, [starts[number] for number in sorted(starts)])
+
+    @classmethod
+    def from_overcooked_ai(cls, source: str | Mapping[str, Any]) -> OvercookedLayout:
+        """Read one of Overcooked-AI's layout files: the text of a ``.layout`` file, its dict, or the bare grid.
+
+        Only the grid is read; recipes, rewards and times in the file describe another game.
+
+        Raises:
+            LayoutError: The text is neither a grid nor a Python literal with a ``grid`` entry.
+        """
+        if isinstance(source, str) and source.lstrip().startswith("{"):
+            try:
+                source = ast.literal_eval(source.strip())
+            except (ValueError, SyntaxError, MemoryError, RecursionError) as error:
+                raise LayoutError(f"not an Overcooked-AI layout file: {error}", rule="type") from error
+        grid = source.get("grid") if isinstance(source, Mapping) else source
+        if isinstance(grid, str):
+            # These files indent every row but the first; no row of a kitchen starts with floor.
+            return cls.from_rows([line.strip() for line in grid.strip().split("\n")])
+        if isinstance(grid, Sequence):
+            return cls.from_rows(grid)
+        raise LayoutError("not an Overcooked-AI layout: it has no `grid` text", rule="type")
+
+    def to_ascii(self) -> str:
+        """The drawing that :meth:`from_ascii` reads back to an equal layout."""
+        rows = [[SYMBOLS[code] for code in row] for row in self._cells]
+        for number, (r, c) in enumerate(self._starts, 1):
+            rows[r][c] = str(number)
+        return "\n".join("".join(row) for row in rows)
+
+    # -- what is where ------------------------------------------------------------------------------------------------------
+
+    @property
+    def cells(self) -> npt.NDArray[np.int8]:
+        """``(H, W)`` read-only cell codes."""
+        return self._cells
+
+    @property
+    def starts(self) -> tuple[Cell, ...]:
+        """``(row, col)`` where each player starts; never empty."""
+        return self._starts
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Number of rows and columns."""
+        return self._cells.shape
+
+    @cached_property
+    def stations(self) -> Mapping[str, Cell]:
+        """Cell of each station by name, in reading order: the plain type where unique, else ``onion@(1,0)``."""
+        found = [(int(r), int(c)) for r, c in np.argwhere(self._cells > OBSTACLE)]
+        kinds = [STATION_TYPES[self._cells[cell] - 3] for cell in found]
+        return {
+            kind if kinds.count(kind) == 1 else f"{kind}@({r},{c})": (r, c)
+            for kind, (r, c) in zip(kinds, found, strict=True)
+        }
+
+    def named(self, kind: str) -> tuple[str, ...]:
+        """Names of all stations of one type, in reading order."""
+        return tuple(name for name in self.stations if name.partition("@")[0] == kind)
+
+    def station_at(self, cell: Sequence[int]) -> str | None:
+        """Name of the station on a cell, or None."""
+        return self._name_at.get((int(cell[0]), int(cell[1])))
+
+    @cached_property
+    def _name_at(self) -> dict[Cell, str]:
+        return {cell: name for name, cell in self.stations.items()}
+
+    def access(self, name: str) -> tuple[Cell, ...]:
+        """Floor cells from which a station can be used, in the order north, south, east, west of it.
+
+        Raises:
+            LayoutError: The kitchen has no station of this name.
+        """
+        if name not in self.stations:
+            raise LayoutError(f"no station {name!r}; this kitchen has {list(self.stations)}", rule="station")
+        row, col = self.stations[name]
+        return tuple(cell for dr, dc in _NEIGHBOURS if self.is_floor(cell := (row + dr, col + dc)))
+
+    def is_floor(self, cell: Sequence[int]) -> bool:
+        """Whether a person can stand on the cell; False outside the grid."""
+        row, col = cell[0], cell[1]
+        return 0 <= row < self.shape[0] and 0 <= col < self.shape[1] and bool(self._cells[row, col] == FLOOR)
+
+    @property
+    def num_obstacles(self) -> int:
+        """Number of virtual obstacles."""
+        return int(np.count_nonzero(self._cells == OBSTACLE))
+
+    @cached_property
+    def layout_id(self) -> str:
+        """Twelve hexadecimal digits that identify the content, the same on every machine and in every version."""
+        return hashlib.sha256(self.to_ascii().encode()).hexdigest()[:12]
+
+    def distances_from(self, cells: Iterable[Sequence[int]]) -> npt.NDArray[np.int32]:
+        """``(H, W)`` number of floor moves from the nearest of the given floor cells; -1 where there is no way."""
+        distances = np.full(self.shape, -1, dtype=np.int32)
+        queue: deque[Cell] = deque()
+        for cell in cells:
+            if self.is_floor(cell):
+                distances[cell[0], cell[1]] = 0
+                queue.append((int(cell[0]), int(cell[1])))
+        while queue:
+            row, col = queue.popleft()
+            for dr, dc in _NEIGHBOURS:
+                following = (row + dr, col + dc)
+                if self.is_floor(following) and distances[following] < 0:
+                    distances[following] = distances[row, col] + 1
+                    queue.append(following)
+        return distances
+
+    # -- changed copies -------------------------------------------------------------------------------------------------------
+
+    def with_cells(self, changes: Mapping[Cell, int | str]) -> OvercookedLayout:
+        """A copy with some cells replaced, given as codes, symbols or station types; players' starts stay."""
+        cells = self._cells.copy()
+        for cell, value in changes.items():
+            if isinstance(value, str):
+                value = STATION_CODES[value] if value in STATION_CODES else _CODE_OF.get(value, -1)
+            cells[cell] = value
+        return OvercookedLayout(cells, self._starts)
+
+    def with_starts(self, starts: Iterable[Sequence[int]]) -> OvercookedLayout:
+        """A copy whose players start elsewhere."""
+        return OvercookedLayout(self._cells, starts)
+
+    # -- value semantics --------------------------------------------------------------------------------------------------------
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, OvercookedLayout):
+            return NotImplemented
+        return self._starts == other._starts and np.array_equal(self._cells, other._cells)
+
+    def __hash__(self) -> int:
+        return hash((self._cells.tobytes(), self.shape, self._starts))
+
+    def __str__(self) -> str:
+        return self.to_ascii()
+
+    def __repr__(self) -> str:
+        return f"OvercookedLayout.from_ascii({self.to_ascii()!r})"
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return OvercookedLayout, (self._cells, self._starts)
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if name in ("_cells", "_starts") and not hasattr(self, name):
+            object.__setattr__(self, name, value)
+            return
+        raise AttributeError(f"layouts are immutable; cannot set {name!r} (see with_cells and with_starts)")

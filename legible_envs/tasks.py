@@ -1,0 +1,461 @@
+"""Tasks: precedence graphs of subtasks, and the exact weights of the stages they pass through.
+
+A person executing a task reaches for one goal after another. Which goals are valid next, and where the person stands
+when choosing, is a *stage*. Eq. 3 of Tung et al. (HRI 2024) sums the legibility of every reach over all valid
+orderings of the subtasks. That sum only needs, for every stage, how often a uniformly random valid ordering visits it,
+and those weights follow from dynamic programming over task states, without listing a single ordering.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from legible_envs.errors import TaskError
+
+if TYPE_CHECKING:
+    import networkx as nx
+
+__all__ = ["Stage", "Subtask", "TaskGraph", "Transition"]
+
+MAX_STATES = 2_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Subtask:
+    """One thing to do: reach one of ``goals``, then pass through ``then``.
+
+    Attributes:
+        name: Unique name within the task.
+        goals: Goals any one of which fulfils the subtask (each equally likely where there are several).
+        after: Names of subtasks that must be complete before this one may begin.
+        then: Places visited after the goal, in order; the person is at the last of them afterwards. Empty means the
+            person stays at the goal.
+        count: Number of interchangeable copies, all of which have to be done.
+    """
+
+    name: str
+    goals: tuple[str, ...]
+    after: tuple[str, ...] = ()
+    then: tuple[str, ...] = ()
+    count: int = 1
+
+    def __post_init__(self) -> None:
+        for attribute in ("goals", "after", "then"):
+            value = getattr(self, attribute)
+            values = (value,) if isinstance(value, str) else tuple(value)
+            if not all(isinstance(v, str) and v for v in values):
+                raise TaskError(f"subtask {self.name!r}: `{attribute}` must hold non-empty names, got {values!r}")
+            object.__setattr__(self, attribute, values)
+        if not isinstance(self.name, str) or not self.name:
+            raise TaskError(f"a subtask needs a non-empty name, got {self.name!r}")
+        if not self.goals:
+            raise TaskError(f"subtask {self.name!r} has no goals; give at least one")
+        if len(set(self.goals)) != len(self.goals):
+            raise TaskError(f"subtask {self.name!r} names a goal twice: {self.goals}")
+        if isinstance(self.count, bool) or not isinstance(self.count, int) or self.count < 1:
+            raise TaskError(f"subtask {self.name!r}: `count` must be an integer >= 1, got {self.count!r}")
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """One point of the task's execution.
+
+    Attributes:
+        start: Where the person is.
+        goals: Goals that are valid next, sorted by name.
+        weight: Expected number of visits in a uniformly random valid sequence.
+    """
+
+    start: str
+    goals: tuple[str, ...]
+    weight: float
+
+
+@dataclass(frozen=True, slots=True)
+class Transition:
+    """A stage together with the goal chosen next and the places passed afterwards.
+
+    Attributes:
+        start: Where the person is.
+        goals: Goals that are valid next, sorted by name.
+        goal: The goal that is reached.
+        then: Places visited after the goal, in order.
+        weight: Expected number of such transitions in a uniformly random valid sequence.
+    """
+
+    start: str
+    goals: tuple[str, ...]
+    goal: str
+    then: tuple[str, ...]
+    weight: float
+
+
+@dataclass(frozen=True)
+class _Class:
+    """Interchangeable subtasks: same goals, same places afterwards, same neighbours in the graph."""
+
+    goals: tuple[str, ...]
+    then: tuple[str, ...]
+    count: int
+    predecessors: tuple[int, ...] = ()
+    group: int = -1
+
+
+_State = tuple[tuple[int, ...], str]
+
+
+@dataclass(frozen=True)
+class TaskGraph:
+    """A precedence graph of subtasks, and the stages its valid sequences pass through.
+
+    A *valid sequence* orders all copies of all subtasks so that each comes after everything it waits for and never
+    more than ``max_open`` groups are begun but unfinished. Copies count as distinct, as in the paper's appendix.
+
+    Args:
+        subtasks: The subtasks, in any order.
+        start: Where the person is at the beginning.
+        groups: Optional disjoint groups of subtasks, ``{group: [subtask, ...]}``, for example one per soup.
+        max_open: How many groups may be in progress at once (``pots=1`` is ``max_open=1``); None means no limit.
+
+    Raises:
+        TaskError: Duplicate or unknown names, a cycle (named), overlapping groups, or no valid sequence at all.
+
+    Example:
+        >>> task = TaskGraph([Subtask("first", ("red",)), Subtask("second", ("blue",), after=("first",))], start="home")
+        >>> task.num_sequences, [(s.start, s.goals, s.weight) for s in task.stages()]
+        (1, [('home', ('red',), 1.0), ('red', ('blue',), 1.0)])
+    """
+
+    subtasks: tuple[Subtask, ...]
+    start: str
+    groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    max_open: int | None = None
+
+    def __init__(
+        self,
+        subtasks: Iterable[Subtask],
+        start: str,
+        groups: Mapping[str, Sequence[str]] | None = None,
+        max_open: int | None = None,
+    ) -> None:
+        object.__setattr__(self, "subtasks", tuple(subtasks))
+        object.__setattr__(self, "start", start)
+        object.__setattr__(self, "groups", {name: tuple(members) for name, members in (groups or {}).items()})
+        object.__setattr__(self, "max_open", max_open)
+        self._check_names()
+        self._check_acyclic()
+        if self._completions[self._initial] == 0:
+            raise TaskError(
+                f"the task has no valid sequence: max_open={max_open} and the precedence contradict each other"
+            )
+
+    def __hash__(self) -> int:
+        return hash((self.subtasks, self.start, tuple(sorted(self.groups.items())), self.max_open))
+
+    # -- what is valid ------------------------------------------------------------------------------------------------
+
+    def _check_names(self) -> None:
+        if not self.subtasks:
+            raise TaskError("a task needs at least one subtask")
+        if not isinstance(self.start, str) or not self.start:
+            raise TaskError(f"`start` must name a place, got {self.start!r}")
+        names = [s.name for s in self.subtasks]
+        repeated = sorted({n for n in names if names.count(n) > 1})
+        if repeated:
+            raise TaskError(f"subtask names must be unique; repeated: {repeated}")
+        for subtask in self.subtasks:
+            unknown = [n for n in subtask.after if n not in names]
+            if unknown:
+                raise TaskError(f"subtask {subtask.name!r} waits for unknown subtasks {unknown}; known: {names}")
+        seen: dict[str, str] = {}
+        for group, members in self.groups.items():
+            for member in members:
+                if member not in names:
+                    raise TaskError(f"group {group!r} names an unknown subtask {member!r}; known: {names}")
+                if member in seen:
+                    raise TaskError(f"subtask {member!r} is in group {seen[member]!r} and in group {group!r}")
+                seen[member] = group
+        if self.max_open is not None and (
+            isinstance(self.max_open, bool) or not isinstance(self.max_open, int) or self.max_open < 1
+        ):
+            raise TaskError(f"`max_open` must be None or an integer >= 1, got {self.max_open!r}")
+
+    def _check_acyclic(self) -> None:
+        waits = {s.name: set(s.after) for s in self.subtasks}
+        while ready := [n for n, after in waits.items() if not after]:
+            for name in ready:
+                del waits[name]
+            for after in waits.values():
+                after.difference_update(ready)
+        if waits:
+            path = [next(iter(waits))]
+            while path[-1] not in path[:-1]:
+                path.append(min(waits[path[-1]] & waits.keys()))
+            cycle = path[path.index(path[-1]) :]
+            raise TaskError("the precedence has a cycle: " + " waits for ".join(cycle))
+
+    # -- dynamic programming over task states ---------------------------------------------------------------------------
+
+    @cached_property
+    def _classes(self) -> tuple[_Class, ...]:
+        """Merge interchangeable subtasks, so that states count copies instead of naming them."""
+        followers: dict[str, frozenset[str]] = {
+            s.name: frozenset(other.name for other in self.subtasks if s.name in other.after) for s in self.subtasks
+        }
+        group_of = {member: i for i, members in enumerate(self.groups.values()) for member in members}
+        members: dict[object, list[Subtask]] = defaultdict(list)
+        for s in self.subtasks:
+            key = (s.goals, s.then, frozenset(s.after), followers[s.name], group_of.get(s.name, -1))
+            members[key].append(s)
+        index = {s.name: i for i, alike in enumerate(members.values()) for s in alike}
+        return tuple(
+            _Class(
+                goals=alike[0].goals,
+                then=alike[0].then,
+                count=sum(s.count for s in alike),
+                predecessors=tuple(sorted({index[name] for name in alike[0].after})),
+                group=group_of.get(alike[0].name, -1),
+            )
+            for alike in members.values()
+        )
+
+    @property
+    def _initial(self) -> _State:
+        return (0,) * len(self._classes), self.start
+
+    def _ready(self, done: tuple[int, ...]) -> list[int]:
+        """Classes of which a copy may be done next, by precedence and open groups."""
+        classes = self._classes
+        begun, unfinished = set(), set()
+        for cls, n in zip(classes, done, strict=True):
+            if cls.group >= 0:
+                if n > 0:
+                    begun.add(cls.group)
+                if n < cls.count:
+                    unfinished.add(cls.group)
+        is_open = begun & unfinished
+        full = self.max_open is not None and len(is_open) >= self.max_open
+        return [
+            i
+            for i, cls in enumerate(classes)
+            if done[i] < cls.count
+            and all(done[p] == classes[p].count for p in cls.predecessors)
+            and not (full and cls.group >= 0 and cls.group not in is_open)
+        ]
+
+    def _steps(self, state: _State) -> list[tuple[int, str, float, _State]]:
+        """``(class, goal, multiplicity, next state)`` of every step possible by precedence; multiplicity counts copies."""
+        done, _ = state
+        steps = []
+        for i in self._ready(done):
+            cls = self._classes[i]
+            after = (*done[:i], done[i] + 1, *done[i + 1 :])
+            for goal in cls.goals:
+                place = cls.then[-1] if cls.then else goal
+                steps.append((i, goal, (cls.count - done[i]) / len(cls.goals), (after, place)))
+        return steps
+
+    @cached_property
+    def _layers(self) -> list[list[_State]]:
+        """All reachable states, by number of finished subtasks."""
+        layers = [[self._initial]]
+        total, seen = sum(cls.count for cls in self._classes), 1
+        for _ in range(total):
+            following = {step[3]: None for state in layers[-1] for step in self._steps(state)}
+            seen += len(following)
+            if seen > MAX_STATES:
+                raise TaskError(
+                    f"the task has more than {MAX_STATES:,} states; merge interchangeable subtasks with `count`"
+                )
+            layers.append(list(following))
+        return layers
+
+    @cached_property
+    def _completions(self) -> dict[_State, int]:
+        """Number of ways to finish the task from each state (copies distinct, goals of one subtask not)."""
+        completions: dict[_State, int] = {}
+        total = sum(cls.count for cls in self._classes)
+        for layer in reversed(self._layers):
+            for state in layer:
+                if sum(state[0]) == total:
+                    completions[state] = 1
+                    continue
+                ways = 0
+                for i in self._ready(state[0]):
+                    # Which goal fulfils the subtask does not change what can follow, so one stands for all.
+                    cls = self._classes[i]
+                    after = (*state[0][:i], state[0][i] + 1, *state[0][i + 1 :])
+                    ways += (cls.count - state[0][i]) * completions[after, cls.then[-1] if cls.then else cls.goals[0]]
+                completions[state] = ways
+        return completions
+
+    @cached_property
+    def _transitions(self) -> tuple[Transition, ...]:
+        completions = self._completions
+        visits: dict[_State, float] = defaultdict(float)
+        visits[self._initial] = 1.0
+        weights: dict[tuple[str, tuple[str, ...], str, tuple[str, ...]], float] = defaultdict(float)
+        for layer in self._layers[:-1]:
+            for state in layer:
+                if not visits[state]:
+                    continue
+                steps = [step for step in self._steps(state) if completions[step[3]]]
+                goals = tuple(sorted({goal for _, goal, _, _ in steps}))
+                for i, goal, copies, following in steps:
+                    # Python ints stay exact however long the task; only the final quotient is a float.
+                    probability = copies * (completions[following] / completions[state])
+                    visits[following] += visits[state] * probability
+                    weights[state[1], goals, goal, self._classes[i].then] += visits[state] * probability
+        return tuple(Transition(*key, weight) for key, weight in sorted(weights.items()))
+
+    # -- what users ask -------------------------------------------------------------------------------------------------
+
+    @property
+    def num_sequences(self) -> int:
+        """Exact number of valid sequences."""
+        return self._completions[self._initial]
+
+    @property
+    def num_states(self) -> int:
+        """Number of task states that lie on some valid sequence: what is done and where the person is."""
+        return sum(1 for ways in self._completions.values() if ways)
+
+    @property
+    def length(self) -> int:
+        """Number of subtasks in every valid sequence, copies counted."""
+        return sum(cls.count for cls in self._classes)
+
+    @property
+    def goals(self) -> tuple[str, ...]:
+        """All goals of the task, sorted by name."""
+        return tuple(sorted({goal for s in self.subtasks for goal in s.goals}))
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """Every place the task names: the start, goals, and places passed afterwards; sorted by name."""
+        passed = {place for s in self.subtasks for place in s.then}
+        return tuple(sorted(passed | {self.start} | set(self.goals)))
+
+    def stages(self) -> tuple[Stage, ...]:
+        """All distinct stages with their exact expected visits; weights sum to :attr:`length`."""
+        weights: dict[tuple[str, tuple[str, ...]], list[float]] = defaultdict(list)
+        for t in self._transitions:
+            weights[t.start, t.goals].append(t.weight)
+        return tuple(Stage(start, goals, math.fsum(w)) for (start, goals), w in weights.items())
+
+    def transitions(self) -> tuple[Transition, ...]:
+        """All distinct transitions (stage, next goal, places afterwards) with their expected number."""
+        return self._transitions
+
+    def legs(self) -> dict[tuple[str, str], float]:
+        """Expected number of walks from each place to each other place in a uniformly random valid sequence."""
+        legs: dict[tuple[str, str], float] = defaultdict(float)
+        for t in self._transitions:
+            stops = (t.start, t.goal, *t.then)
+            for a, b in zip(stops[:-1], stops[1:], strict=True):
+                legs[a, b] += t.weight
+        return dict(legs)
+
+    # -- in and out -------------------------------------------------------------------------------------------------------
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data that :meth:`from_dict` reads back; the structure of the YAML files."""
+        subtasks = []
+        for s in self.subtasks:
+            entry: dict[str, Any] = {"name": s.name, "goals": list(s.goals)}
+            if s.after:
+                entry["after"] = list(s.after)
+            if s.then:
+                entry["then"] = list(s.then)
+            if s.count != 1:
+                entry["count"] = s.count
+            subtasks.append(entry)
+        data: dict[str, Any] = {"start": self.start, "subtasks": subtasks}
+        if self.groups:
+            data["groups"] = {name: list(members) for name, members in self.groups.items()}
+        if self.max_open is not None:
+            data["max_open"] = self.max_open
+        return data
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> TaskGraph:
+        """Build a task from plain data.
+
+        Args:
+            data: Keys ``start``, ``subtasks`` (a list of mappings with the fields of :class:`Subtask`), and optionally
+                ``groups`` and ``max_open``. A single name may stand for a list of one.
+
+        Raises:
+            TaskError: A missing or unknown key, or anything :class:`TaskGraph` rejects.
+        """
+        if not isinstance(data, Mapping):
+            raise TaskError(f"a task must be a mapping with keys `start` and `subtasks`, got {type(data).__name__}")
+        _check_keys(data, required={"start", "subtasks"}, optional={"groups", "max_open"}, where="the task")
+        entries = data["subtasks"]
+        if isinstance(entries, str) or not isinstance(entries, Sequence):
+            raise TaskError(f"`subtasks` must be a list, got {type(entries).__name__}")
+        subtasks = []
+        for number, entry in enumerate(entries, 1):
+            if not isinstance(entry, Mapping):
+                raise TaskError(f"subtask number {number} must be a mapping, got {type(entry).__name__}")
+            _check_keys(entry, {"name", "goals"}, {"after", "then", "count"}, f"subtask number {number}")
+            # YAML reads `after:` with nothing behind it as null; a person means "nothing".
+            subtasks.append(Subtask(**{key: value for key, value in entry.items() if value is not None}))
+        groups = data.get("groups") or {}
+        if not isinstance(groups, Mapping):
+            raise TaskError(f"`groups` must map group names to lists of subtasks, got {type(groups).__name__}")
+        return cls(subtasks, data["start"], groups, data.get("max_open"))
+
+    def to_yaml(self, path: str | Path | None = None) -> str:
+        """Return the task as YAML text, and write it to ``path`` if given."""
+        import yaml
+
+        text = yaml.safe_dump(self.to_dict(), sort_keys=False, allow_unicode=True)
+        if path is not None:
+            Path(path).write_text(text, encoding="utf-8")
+        return text
+
+    @classmethod
+    def from_yaml(cls, source: str | Path) -> TaskGraph:
+        """Read a task from a YAML file (a ``Path``, or a string naming a ``.yaml``/``.yml`` file) or from YAML text.
+
+        Raises:
+            TaskError: The text is not YAML, or not a task.
+            FileNotFoundError: The file does not exist.
+        """
+        import yaml
+
+        is_file = isinstance(source, Path) or ("\n" not in source and source.endswith((".yaml", ".yml")))
+        text = Path(source).read_text(encoding="utf-8") if is_file else str(source)
+        try:
+            data = yaml.safe_load(text)
+        except yaml.YAMLError as error:
+            raise TaskError(f"not valid YAML: {error}") from error
+        return cls.from_dict(data)
+
+    def to_networkx(self) -> nx.DiGraph:
+        """The precedence graph; an edge runs from each subtask to the subtasks that wait for it."""
+        import networkx as nx
+
+        graph = nx.DiGraph(start=self.start, max_open=self.max_open)
+        group_of = {member: group for group, members in self.groups.items() for member in members}
+        for s in self.subtasks:
+            graph.add_node(s.name, goals=s.goals, then=s.then, count=s.count, group=group_of.get(s.name))
+        graph.add_edges_from((before, s.name) for s in self.subtasks for before in s.after)
+        return graph
+
+
+def _check_keys(data: Mapping[str, Any], required: set[str], optional: set[str], where: str) -> None:
+    missing = sorted(required - data.keys())
+    unknown = sorted(str(key) for key in data.keys() - required - optional)
+    if missing or unknown:
+        raise TaskError(
+            f"{where} has missing keys {missing} and unknown keys {unknown}; "
+            f"required: {sorted(required)}, optional: {sorted(optional)}"
+        )

@@ -1,0 +1,1 @@
+"""Search for legible layouts: pyribs archives and schedulers with emitters made for workspaces."""
