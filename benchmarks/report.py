@@ -1,0 +1,334 @@
+"""``report.html``: one self-contained page about a search, readable from disk, from mail, in ten years.
+
+The page makes no request of any kind. Numbers and layouts travel in one JSON block that the page can save as a file;
+drawing happens in the reader's browser.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from benchmarks.runs import Run, read_run
+
+if TYPE_CHECKING:
+    from legible_envs.overcooked.layout import OvercookedLayout
+
+__all__ = ["Condition", "report_data", "write_best_image", "write_report"]
+
+MAX_LAYOUTS = 1_000
+"""At most so many cells, the best ones, carry their layouts."""
+LAYOUT_BYTES = 150_000
+"""And at most so many bytes of layouts, so that large kitchens do not outgrow the page."""
+MAX_ROWS, MAX_COLUMNS = 80, 120
+"""Finer archives are drawn with several cells in one, each showing the best of them."""
+MAX_POINTS = 240
+"""Points of a search curve; longer histories are thinned."""
+
+
+@dataclass(frozen=True)
+class Condition:
+    """One way of making a layout, to be shown beside the others.
+
+    Attributes:
+        name: What it is called, such as ``"random"``.
+        layout: A layout that stands for it.
+        score: Its legibility.
+        distance: Expected floor moves of the whole task.
+        normalised: Legibility as a share of the highest conceivable, at most 1.
+        note: One sentence on how the layout was chosen.
+    """
+
+    name: str
+    layout: OvercookedLayout
+    score: float
+    distance: float
+    normalised: float | None = None
+    note: str = ""
+
+
+def write_report(
+    run_folder: str | Path,
+    *,
+    conditions: Sequence[Condition] | None = None,
+    recorded_play: Mapping[str, Any] | None = None,
+) -> Path:
+    """Write ``report.html`` into a run folder, from the files that :func:`optimizers.search` left there.
+
+    Args:
+        run_folder: The folder of a finished, interrupted or running search.
+        conditions: Layouts to show side by side; None leaves the section out.
+        recorded_play: How predictors read recorded people (see :func:`benchmarks.demo.recorded_play`): ``note``,
+            ``fractions``, ``curves`` (each ``label``, ``values``) and ``table`` (``columns``, ``rows``). None leaves
+            the section out; a mapping with only a ``note`` says why there is none.
+
+    Returns:
+        The path of the page.
+
+    Raises:
+        RunError: A file of the run is missing or damaged.
+    """
+    run = read_run(run_folder)
+    path = run.folder / "report.html"
+    _write_atomically(path, _render(report_data(run, conditions, recorded_play)))
+    return path
+
+
+def write_best_image(run_folder: str | Path, *, tile: int = 64) -> Path:
+    """Write ``best.png``, a drawing of the run's best layout, into its folder."""
+    from legible_envs.overcooked.rendering import draw_layout, save_png
+
+    run = read_run(run_folder)
+    path = run.folder / "best.png"
+    save_png(path, draw_layout(run.workspace.decode(run.best_genome), tile=tile))
+    return path
+
+
+def report_data(
+    run: Run,
+    conditions: Sequence[Condition] | None = None,
+    recorded_play: Mapping[str, Any] | None = None,
+) -> dict[str, Any]:
+    """Everything the page shows, as JSON-ready data; this is also what its download button saves."""
+    config = run.config
+    rows, columns = (int(n) for n in config["archive"]["dims"])
+    return {
+        "schema": 1,
+        "shape": list(run.workspace.decode(run.best_genome).shape),
+        "objective": dict(config["objective"]),
+        "best": _best(run),
+        "axes": _axes(run, rows, columns),
+        "cells": _cells(run, rows, columns),
+        "archive_size": len(run.solution),
+        "archive_dims": [rows, columns],
+        "history": _history(run),
+        "conditions": [_condition(c) for c in conditions or ()],
+        "recorded_play": _plain(dict(recorded_play)) if recorded_play else None,
+        "config": {key: value for key, value in config.items() if key != "result"},
+        "result": {key: _plain(value) for key, value in (config.get("result") or {}).items() if key != "best_genome"},
+    }
+
+
+# -- the parts of the data ---------------------------------------------------------------------------------------------
+
+
+def _best(run: Run) -> dict[str, Any]:
+    genome = run.best_genome
+    summary = {key: _plain(value) for key, value in run.workspace.summary(genome).items()}
+    return {**summary, "layout": _one_line(run.workspace.decode(genome))}
+
+
+def _axes(run: Run, rows: int, columns: int) -> list[dict[str, Any]]:
+    """Names and labels of both axes; ``step`` is how many archive cells share one drawn cell."""
+    names = list(config_names) if (config_names := run.config["archive"].get("measure_names")) else ["", ""]
+    order_names = list(getattr(run.workspace, "order_names", ()))
+    axes = []
+    for name, count, most, labels in (
+        (names[0], rows, MAX_ROWS, None),
+        (names[1], columns, MAX_COLUMNS, order_names if len(order_names) == columns else None),
+    ):
+        step = math.ceil(count / most)
+        shown = [str(labels[i] if labels else i) for i in range(0, count, step)]
+        axes.append({"name": str(name), "count": len(shown), "step": step, "labels": shown})
+    return axes
+
+
+def _cells(run: Run, rows: int, columns: int) -> list[list[Any]]:
+    """The archive as ``[row, column, objective, legibility, distance, layout or None]``, best first."""
+    steps = (math.ceil(rows / MAX_ROWS), math.ceil(columns / MAX_COLUMNS))
+    drawn: dict[tuple[int, int], int] = {}
+    for i, index in enumerate(run.index):
+        row, column = divmod(int(index), columns)
+        drawn.setdefault((row // steps[0], column // steps[1]), i)
+    if not drawn:
+        return []
+    genomes = run.solution[list(drawn.values())]
+    legibility, distance = run.workspace.legibility(genomes), run.workspace.distance(genomes)
+    height, width = run.workspace.decode(genomes[0]).shape
+    carried = min(MAX_LAYOUTS, LAYOUT_BYTES // (height * width + 3))
+    return [
+        [
+            *cell,
+            _plain(run.objective[i]),
+            _plain(legibility[n]),
+            _plain(distance[n]),
+            _one_line(run.workspace.decode(genomes[n])) if n < carried else None,
+        ]
+        for n, (cell, i) in enumerate(drawn.items())
+    ]
+
+
+def _history(run: Run) -> dict[str, list[float | None]]:
+    names = ("evaluations", "best", "qd_score", "coverage")
+    length = min((len(run.history[name]) for name in names if name in run.history), default=0)
+    if length == 0 or any(name not in run.history for name in names):
+        return {}
+    picked = np.unique(np.linspace(0, length - 1, min(length, MAX_POINTS)).round().astype(int))
+    return {name: [_plain(v) for v in run.history[name][picked]] for name in names}
+
+
+def _condition(condition: Condition) -> dict[str, Any]:
+    return {
+        "name": condition.name,
+        "note": condition.note,
+        "layout": _one_line(condition.layout),
+        "shape": list(condition.layout.shape),
+        "score": _plain(condition.score),
+        "distance": _plain(condition.distance),
+        "normalised": _plain(condition.normalised),
+    }
+
+
+def _one_line(layout: OvercookedLayout) -> str:
+    """The drawing without line breaks and players: ``H * W`` symbols."""
+    from legible_envs.overcooked.layout import SYMBOLS
+
+    return "".join(SYMBOLS[code] for code in layout.cells.ravel())
+
+
+def _plain(value: Any) -> Any:
+    """The same in types that JSON has; numbers to five digits, NaN and infinities as null."""
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, bool | np.bool_):
+        return bool(value)
+    if isinstance(value, int | np.integer):
+        return int(value)
+    if isinstance(value, float | np.floating):
+        return float(f"{value:.5g}") if math.isfinite(value) else None
+    return value if value is None or isinstance(value, str) else str(value)
+
+
+# -- the page ----------------------------------------------------------------------------------------------------------
+
+
+def _render(data: dict[str, Any]) -> str:
+    from jinja2 import Environment, StrictUndefined
+    from markupsafe import Markup
+
+    from legible_envs.overcooked.rendering.palette import PALETTE
+
+    folder = files("benchmarks") / "templates"
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters["number"] = _number
+    template = environment.from_string((folder / "report.html.j2").read_text(encoding="utf-8"))
+    return template.render(
+        title=_title(data),
+        lede=_lede(data),
+        figures=_figures(data),
+        palette=PALETTE,
+        data=data,
+        best=data["best"],
+        settings=_settings(data["config"]),
+        created=_date(data["config"].get("created")),
+        style=Markup((folder / "report.css").read_text(encoding="utf-8")),
+        script=Markup((folder / "report.js").read_text(encoding="utf-8")),
+        payload=Markup(_json_for_script(data)),
+    )
+
+
+def _json_for_script(data: dict[str, Any]) -> str:
+    """JSON that cannot end the script element it stands in, nor begin a comment there."""
+    text = json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False, default=str)
+    return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
+
+
+def _title(data: dict[str, Any]) -> str:
+    rows, columns = data["shape"]
+    return f"A search for {_WANTED.get(data['objective']['name'], 'good')} kitchens, {rows} × {columns}"
+
+
+_WANTED = {"legibility": "legible", "efficiency": "efficient", "legible-efficient": "legible and efficient"}
+
+
+def _lede(data: dict[str, Any]) -> str:
+    """What was found, in two sentences."""
+    best, conditions = data["best"], {c["name"]: c for c in data["conditions"]}
+    text = f"The best kitchen found scores {_number(best.get('score'))} in legibility"
+    if best.get("normalised") is not None:
+        text += f", {_number(100 * best['normalised'], 0)} % of the highest conceivable score"
+    text += f", and its task takes {_number(best.get('distance'), 1)} steps on average."
+    if "random" in conditions:
+        other = conditions["random"]
+        text += (
+            f" A median random one scores {_number(other['score'])} and takes {_number(other['distance'], 1)} steps."
+        )
+    cap = data["objective"].get("max_distance")
+    return text if cap is None else f"{text} Layouts above a distance of {_number(cap, 1)} were not allowed."
+
+
+def _figures(data: dict[str, Any]) -> list[tuple[str, str, str]]:
+    """Key figures under the title: name, value, remark."""
+    best, result, config = data["best"], data["result"], data["config"]
+    share = best.get("single_goal_share")
+    filled, cells = data["archive_size"], math.prod(data["archive_dims"])
+    evaluations = result.get("evaluations") or (data["history"].get("evaluations") or [None])[-1]
+    single = "" if share is None else f"{_number(100 * share, 0)} % from single-goal reaches"
+    return [
+        ("Legibility", _number(best.get("score")), single),
+        ("Normalised", _number(best.get("normalised")), "of at most 1"),
+        ("Distance", _number(best.get("distance"), 1), "expected steps of one task"),
+        ("Evaluations", _number(evaluations, 0), f"seed {config.get('seed')}"),
+        (
+            "Archive",
+            f"{_number(filled, 0)} layouts",
+            f"{_number(100 * filled / cells, 0)} % of {_number(cells, 0)} cells",
+        ),
+    ]
+
+
+def _settings(config: Mapping[str, Any]) -> list[tuple[str, list[tuple[str, str]]]]:
+    """The manifest as titled lists of name and value, for people."""
+
+    def flat(value: Any, prefix: str = "") -> list[tuple[str, str]]:
+        if isinstance(value, Mapping):
+            return [row for key, item in value.items() for row in flat(item, f"{prefix}{key} ")]
+        text = "none" if value is None else json.dumps(value) if isinstance(value, list | bool) else str(value)
+        return [(prefix.strip().replace("_", " "), text if len(text) <= 240 else text[:239] + "…")]
+
+    searched = {key: config.get(key) for key in ("objective", "emitter", "seed", "evaluations", "calibration")}
+    archive = {key: value for key, value in config["archive"].items() if key != "ranges"}
+    made = {key: config.get(key) for key in ("created", "git_revision", "platform")}
+    groups = [
+        ("Search", {**searched, "archive": archive}),
+        ("Workspace", config["workspace"]),
+        ("Versions", {**made, **(config.get("versions") or {})}),
+    ]
+    return [(title, flat(group)) for title, group in groups]
+
+
+def _date(text: Any) -> str:
+    try:
+        return datetime.fromisoformat(str(text)).strftime("%-d %B %Y, %H:%M")
+    except ValueError:
+        return ""
+
+
+def _number(value: Any, digits: int = 2) -> str:
+    """A number for reading: thousands apart, a true minus sign, a dash where there is none."""
+    if value is None:
+        return "–"
+    return f"{value:,.{digits}f}".replace("-", "\u2212").replace(",", "\u202f")
+
+
+def _write_atomically(path: Path, text: str) -> None:
+    """Write all or nothing: a full disk must not leave half a page in the place of a whole one."""
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        temporary.write_text(text, encoding="utf-8")
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)

@@ -1,0 +1,371 @@
+"use strict";
+(() => {
+  const data = JSON.parse(document.getElementById("data").textContent);
+  const $ = (id) => document.getElementById(id);
+  const SVG = $("icons").namespaceURI;
+  const [rowAxis, columnAxis] = data.axes;
+  const STATIONS = { T: "tomato", O: "onion", C: "cabbage", F: "fish", D: "dishes", P: "pot", S: "serving" };
+
+  // -- small helpers ---------------------------------------------------------------------------------------------------
+
+  function el(name, attributes = {}, ...children) {
+    const node = document.createElement(name);
+    for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
+    node.append(...children.filter((child) => child !== null));
+    return node;
+  }
+  function svg(name, attributes = {}, ...children) {
+    const node = document.createElementNS(SVG, name);
+    for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
+    node.append(...children);
+    return node;
+  }
+  function number(value, digits = 2) {
+    if (value === null || value === undefined) return "–";
+    const [whole, rest] = Math.abs(value).toFixed(digits).split(".");
+    const spaced = whole.replace(/\B(?=(\d{3})+$)/g, "\u202f");
+    return (value < 0 && Number(value.toFixed(digits)) !== 0 ? "\u2212" : "") + spaced + (rest ? "." + rest : "");
+  }
+  const plural = (n, word) => `${number(n, 0)} ${word}${n === 1 ? "" : "s"}`;
+  function tell(text) {
+    $("tip").textContent = text;
+    $("tip").hidden = false;
+    clearTimeout(tell.timer);
+    tell.timer = setTimeout(() => { $("tip").hidden = true; }, 2600);
+  }
+  // Lightness rises evenly, so equal steps of the score look equal, and the order survives without colour vision.
+  const ramp = (t) => `oklch(${(0.3 + 0.62 * t).toFixed(3)} ${(0.1 + 0.05 * Math.sin(Math.PI * t)).toFixed(3)} ${(285 - 185 * t).toFixed(1)})`;
+
+  // -- kitchens --------------------------------------------------------------------------------------------------------
+
+  function describe(layout, width) {
+    const places = [];
+    [...layout].forEach((symbol, i) => {
+      if (STATIONS[symbol]) places.push(`${STATIONS[symbol]} at row ${Math.floor(i / width)}, column ${i % width}`);
+    });
+    return `Kitchen: ${places.join("; ")}; ${plural([...layout].filter((s) => s === "V").length, "virtual obstacle")}.`;
+  }
+  function board(layout, [height, width]) {
+    const picture = svg("svg", { viewBox: `0 0 ${width * 48} ${height * 48}`, class: "board", role: "img", "aria-label": describe(layout, width) });
+    [...layout].forEach((symbol, i) => {
+      const row = Math.floor(i / width), column = i % width;
+      const place = { x: column * 48, y: row * 48, width: 48, height: 48 };
+      const floor = (row + column) % 2 ? "floor-alternate" : "floor";
+      if (symbol === " " || symbol === "V") picture.append(svg("use", { href: `#s-${floor}`, ...place }));
+      if (symbol !== " ") picture.append(svg("use", { href: `#s-${symbol}`, ...place }));
+      if (STATIONS[symbol]) {
+        const tag = svg("g", {}, svg("rect", { class: "tag", x: place.x + 30, y: place.y + 29, width: 17, height: 17, rx: 4.5 }));
+        const letter = svg("text", { class: "letter", x: place.x + 38.5, y: place.y + 42 });
+        letter.textContent = symbol;
+        tag.append(letter, svg("title"));
+        tag.lastChild.textContent = STATIONS[symbol];
+        picture.append(tag);
+      }
+    });
+    return picture;
+  }
+  function asText(layout, width) {
+    return layout.match(new RegExp(`.{${width}}`, "g")).join("\n");
+  }
+
+  // -- the archive -----------------------------------------------------------------------------------------------------
+
+  const cells = data.cells.map(([row, column, objective, legibility, distance, layout], rank) => ({ row, column, objective, legibility, distance, layout, rank }));
+  const at = new Map(cells.map((cell) => [cell.row * columnAxis.count + cell.column, cell]));
+  const values = cells.map((cell) => cell.objective);
+  const [low, high] = [Math.min(...values), Math.max(...values)];
+  // The worst few cells are much worse than the rest: the ramp starts at the fifth percentile.
+  const floorValue = values.length > 20 ? values[Math.floor(values.length * 0.95)] : low;
+  const shade = (value) => ramp(high > floorValue ? Math.max(0, Math.min(1, (value - floorValue) / (high - floorValue))) : 1);
+  const cellWidth = Math.max(7, Math.min(26, 640 / columnAxis.count));
+  const cellHeight = Math.max(6, Math.min(22, 600 / rowAxis.count));
+  const short = (label) => {
+    const words = String(label).split(/[^A-Za-z]+/).filter(Boolean);
+    return words.length > 1 ? words.map((word) => word[0].toUpperCase()).join("") : String(label);
+  };
+  const longest = Math.max(...columnAxis.labels.map((label) => short(label).length));
+  const margin = { left: 44, top: 4, bottom: 14 + longest * 6.6 + 22 };
+  const size = { width: margin.left + columnAxis.count * cellWidth + 2, height: margin.top + rowAxis.count * cellHeight + margin.bottom };
+  const cellX = (column) => margin.left + column * cellWidth;
+  const cellY = (row) => margin.top + (rowAxis.count - 1 - row) * cellHeight;
+  const columnNames = [], rowNames = [];
+  let picture, cursor, pinned = cells[0], shown = null;
+
+  function drawMap() {
+    picture = svg("svg", { viewBox: `0 0 ${size.width} ${size.height}`, "aria-hidden": "true" });
+    const inset = Math.min(1, cellWidth / 12);
+    const paint = (cell, attributes) => svg("rect", { x: cell.x + inset, y: cell.y + inset, width: cellWidth - 2 * inset, height: cellHeight - 2 * inset, rx: 2, ...attributes });
+    for (let row = 0; row < rowAxis.count; row++) {
+      for (let column = 0; column < columnAxis.count; column++) {
+        const cell = at.get(row * columnAxis.count + column);
+        const place = { x: cellX(column), y: cellY(row) };
+        picture.append(cell ? paint(place, { fill: shade(cell.objective), class: "cell", "data-rank": cell.rank }) : paint(place, { class: "empty" }));
+      }
+    }
+    const every = Math.max(1, Math.ceil(13 / cellWidth));
+    columnAxis.labels.forEach((label, i) => {
+      const x = cellX(i) + cellWidth / 2, y = size.height - margin.bottom + 10;
+      const text = svg("text", { class: "mono", transform: `translate(${x + 3.5} ${y}) rotate(-90)`, "text-anchor": "end" });
+      if (i % every === 0) text.textContent = short(label);
+      columnNames.push(text);
+      const title = svg("title");
+      title.textContent = columnAxis.step > 1 ? `from ${label}` : label;
+      text.append(title);
+      picture.append(text);
+    });
+    const everyRow = Math.max(1, Math.ceil(14 / cellHeight), rowAxis.count > 12 ? 5 : 1);
+    rowAxis.labels.forEach((label, i) => {
+      const text = svg("text", { x: margin.left - 8, y: cellY(i) + cellHeight / 2 + 4, "text-anchor": "end" });
+      if (i % everyRow === 0) text.textContent = label;
+      rowNames.push(text);
+      picture.append(text);
+    });
+    const under = svg("text", { x: margin.left + columnAxis.count * cellWidth / 2, y: size.height - 4, "text-anchor": "middle" });
+    under.textContent = columnAxis.name + " →";
+    const beside = svg("text", { transform: `translate(10 ${margin.top + rowAxis.count * cellHeight / 2}) rotate(-90)`, "text-anchor": "middle" });
+    beside.textContent = rowAxis.name + " →";
+    picture.append(under, beside);
+    if (cells.length) {
+      const best = { x: cellX(cells[0].column), y: cellY(cells[0].row) };
+      picture.append(svg("rect", { class: "best-mark", x: best.x - 1, y: best.y - 1, width: cellWidth + 2, height: cellHeight + 2, rx: 3 }));
+    }
+    cursor = svg("g", { visibility: "hidden" }, ...["halo", "cursor"].map((name) => svg("rect", { class: name, width: cellWidth + 4, height: cellHeight + 4, rx: 4 })));
+    picture.append(cursor);
+    $("map").append(picture);
+    drawLegend();
+  }
+  function drawLegend() {
+    if (!cells.length) { $("legend").textContent = "The archive is empty."; return; }
+    const stops = Array.from({ length: 17 }, (_, i) => ramp(i / 16)).join(", ");
+    const bar = el("span", { class: "ramp" });
+    bar.style.background = `linear-gradient(90deg, ${stops})`;
+    const names = { "legibility": "legibility", "efficiency": "efficiency (distance, negated)" };
+    const parts = [el("span", {}, names[data.objective.name] || data.objective.name), el("span", {}, (low < floorValue ? "≤ " : "") + number(floorValue)), bar, el("span", {}, number(high)), el("span", { class: "swatch ring" }), "best"];
+    if (cells.length < rowAxis.count * columnAxis.count) parts.push(el("span", { class: "swatch" }), "none found");
+    if (rowAxis.step * columnAxis.step > 1) parts.push(el("span", {}, `each square: the best of ${rowAxis.step * columnAxis.step} cells`));
+    $("legend").append(...parts);
+  }
+  function pairs(items) {
+    const list = el("dl", { class: "pairs" });
+    for (const [name, value] of items) list.append(el("div", {}, el("dt", {}, name), el("dd", {}, value)));
+    return list;
+  }
+  function show(cell) {
+    if (!cell || cell === shown) return;
+    shown = cell;
+    for (const rect of cursor.children) { rect.setAttribute("x", cellX(cell.column) - 2); rect.setAttribute("y", cellY(cell.row) - 2); }
+    cursor.setAttribute("visibility", "visible");
+    columnNames.forEach((text, i) => text.classList.toggle("on", i === cell.column));
+    rowNames.forEach((text, i) => text.classList.toggle("on", i === cell.row));
+    $("board").replaceChildren(cell.layout ? board(cell.layout, data.shape) : el("div", { class: "missing" }, "The page carries the drawings of the best cells only; this layout lies in archive.npz."));
+    const obstacles = cell.layout ? [...cell.layout].filter((s) => s === "V").length : rowAxis.labels[cell.row];
+    const order = String(columnAxis.labels[cell.column]).split(/[^A-Za-z]+/).filter(Boolean).join(" · ") || columnAxis.labels[cell.column];
+    const facts = [["Legibility", number(cell.legibility)], ["Distance", number(cell.distance, 1)], ["Obstacles", String(obstacles)]];
+    if (!["legibility", "efficiency"].includes(data.objective.name)) facts.unshift([data.objective.name, number(cell.objective)]);
+    $("readout").replaceChildren(el("p", { class: "order" }, (columnAxis.step > 1 ? "near " : "") + order), pairs(facts), el("div", { class: "rank" }, `rank ${number(cell.rank + 1, 0)} of ${number(cells.length, 0)}`));
+    $("show-previous").disabled = cell.rank === 0;
+    $("show-next").disabled = cell.rank === cells.length - 1;
+    $("copy").disabled = !cell.layout;
+  }
+  function pin(cell) {
+    if (!cell) return;
+    pinned = cell;
+    show(cell);
+  }
+  function under(event) {
+    const box = picture.getBoundingClientRect();
+    const x = (event.clientX - box.left) / box.width * size.width, y = (event.clientY - box.top) / box.height * size.height;
+    const column = Math.floor((x - margin.left) / cellWidth), row = rowAxis.count - 1 - Math.floor((y - margin.top) / cellHeight);
+    if (row < 0 || row >= rowAxis.count || column < 0 || column >= columnAxis.count) return undefined;
+    return at.get(row * columnAxis.count + column);
+  }
+  function neighbour(cell, dRow, dColumn) {
+    let found, cost = Infinity;
+    for (const other of cells) {
+      const ahead = (other.row - cell.row) * dRow + (other.column - cell.column) * dColumn;
+      const aside = Math.abs(dRow ? other.column - cell.column : other.row - cell.row);
+      // A layout in the same line comes first, however far; else the nearest line that has one.
+      const price = aside * 10000 + ahead;
+      if (ahead > 0 && price < cost) { found = other; cost = price; }
+    }
+    return found;
+  }
+  const KEYS = {
+    ArrowUp: (cell) => neighbour(cell, 1, 0), ArrowDown: (cell) => neighbour(cell, -1, 0),
+    ArrowRight: (cell) => neighbour(cell, 0, 1), ArrowLeft: (cell) => neighbour(cell, 0, -1),
+    Home: () => cells[0], End: () => cells[cells.length - 1],
+    n: (cell) => cells[cell.rank + 1], p: (cell) => cells[cell.rank - 1],
+  };
+  function listen() {
+    const map = $("map");
+    map.addEventListener("pointermove", (event) => show(under(event) || pinned));
+    map.addEventListener("pointerleave", () => show(pinned));
+    map.addEventListener("click", (event) => pin(under(event)));
+    map.addEventListener("keydown", (event) => {
+      const move = KEYS[event.key] || KEYS[event.key.toLowerCase()];
+      if (!move || event.ctrlKey || event.metaKey || event.altKey) return;
+      event.preventDefault();
+      pin(move(pinned));
+    });
+    $("show-best").addEventListener("click", () => pin(cells[0]));
+    $("show-previous").addEventListener("click", () => pin(cells[pinned.rank - 1]));
+    $("show-next").addEventListener("click", () => pin(cells[pinned.rank + 1]));
+    $("copy").addEventListener("click", () => copy(asText(shown.layout, data.shape[1])));
+    $("download").addEventListener("click", download);
+  }
+  async function copy(text) {
+    try {
+      await navigator.clipboard.writeText(text);
+    } catch {
+      const box = el("textarea", { class: "visually-hidden" });
+      box.value = text;
+      document.body.append(box);
+      box.select();
+      document.execCommand("copy");
+      box.remove();
+    }
+    tell("Layout copied; `legible show -` reads it");
+  }
+  function download() {
+    const link = el("a", { download: "legible-report.json" });
+    link.href = URL.createObjectURL(new Blob([JSON.stringify(data, null, 1)], { type: "application/json" }));
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+  }
+
+  // -- boards side by side ---------------------------------------------------------------------------------------------
+
+  function bar(name, value, [from, to], digits) {
+    const position = (v) => Math.max(0, Math.min(100, (v - from) / (to - from || 1) * 100));
+    const [a, b] = [position(Math.min(0, value)), position(Math.max(0, value))];
+    const fill = el("span", { class: "fill" });
+    fill.style.left = a + "%";
+    fill.style.width = Math.max(b - a, 0.8) + "%";
+    return el("div", { class: `bar ${name}` }, el("span", {}, name[0].toUpperCase() + name.slice(1)), el("span", { class: "track" }, fill), el("span", {}, number(value, digits)));
+  }
+  function drawConditions() {
+    const range = (key) => [Math.min(0, ...data.conditions.map((c) => c[key])), Math.max(0, ...data.conditions.map((c) => c[key]))];
+    const [scores, distances] = [range("score"), range("distance")];
+    for (const condition of data.conditions) {
+      $("conditions").append(el("figure", {}, board(condition.layout, condition.shape),
+        el("figcaption", {}, el("div", { class: "name" }, condition.name[0].toUpperCase() + condition.name.slice(1)), el("p", { class: "note" }, condition.note),
+          bar("legibility", condition.score, scores, 2), bar("distance", condition.distance, distances, 1))));
+    }
+  }
+  function drawBest() {
+    const seen = new Set();
+    for (const cell of cells) {
+      if (!cell.layout || seen.has(cell.column) || seen.size === 12) continue;
+      seen.add(cell.column);
+      const card = el("button", { type: "button", class: "card", "aria-label": `Show the layout of rank ${cell.rank + 1} on the map` }, board(cell.layout, data.shape));
+      card.addEventListener("click", () => { pin(cell); $("map").focus({ preventScroll: true }); $("h-archive").scrollIntoView({ behavior: matchMedia("(prefers-reduced-motion: reduce)").matches ? "auto" : "smooth" }); });
+      $("best").append(el("figure", {}, card, el("figcaption", {}, el("div", { class: "name" }, number(cell.objective)), el("p", { class: "note" }, `${short(columnAxis.labels[cell.column])} · ${plural([...cell.layout].filter((s) => s === "V").length, "obstacle")} · distance ${number(cell.distance, 1)}`))));
+    }
+  }
+
+  // -- curves ----------------------------------------------------------------------------------------------------------
+
+  function ticks(from, to, count = 4) {
+    const rough = (to - from) / count || 1, power = 10 ** Math.floor(Math.log10(rough));
+    const step = [1, 2, 2.5, 5, 10].find((m) => m * power >= rough) * power;
+    const list = [];
+    for (let v = Math.ceil(from / step - 1e-9) * step; v <= to + step * 1e-6; v += step) list.push(Math.abs(v) < step * 1e-6 ? 0 : v);
+    return list;
+  }
+  const compact = (v) => Math.abs(v) >= 1e6 ? number(v / 1e6, v % 1e6 ? 1 : 0) + " M" : Math.abs(v) >= 1e4 ? number(v / 1e3, v % 1e3 ? 1 : 0) + " k" : number(v, v % 1 ? (Math.abs(v) < 1 ? 2 : 1) : 0);
+  function axes(frame, xs, [bottom, top], { format = compact, formatX = compact, label = "" }) {
+    const { width, height, left, under: below } = frame;
+    const x = (v) => left + (v - xs[0]) / (xs[xs.length - 1] - xs[0] || 1) * (width - left - 8);
+    const y = (v) => height - below - (v - bottom) / (top - bottom || 1) * (height - below - 8);
+    const canvas = svg("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": label });
+    for (const v of ticks(bottom, top)) {
+      canvas.append(svg("line", { class: "grid", x1: left, x2: width - 8, y1: y(v), y2: y(v) }));
+      const text = svg("text", { x: left - 6, y: y(v) + 4, "text-anchor": "end" });
+      text.textContent = format(v);
+      canvas.append(text);
+    }
+    for (const v of ticks(xs[0], xs[xs.length - 1])) {
+      const text = svg("text", { x: x(v), y: height - below + 18, "text-anchor": "middle" });
+      text.textContent = formatX(v);
+      canvas.append(text);
+    }
+    return { canvas, x, y };
+  }
+  function drawCurves() {
+    const xs = data.history.evaluations;
+    const charts = [["best", "Best " + data.objective.name, number], ["qd_score", "QD score", (v) => number(v, 0)], ["coverage", "Coverage", (v) => number(v * 100, 1) + " %"]];
+    const moves = [];
+    for (const [key, title, format] of charts) {
+      const points = data.history[key].map((v, i) => [xs[i], v]).filter(([, v]) => v !== null);
+      if (!points.length) continue;
+      const ys = points.map(([, v]) => v);
+      let [bottom, top] = [Math.min(...ys), Math.max(...ys)];
+      if (key === "coverage" || (bottom > 0 && bottom < top * 0.6)) bottom = 0;
+      if (top === bottom) top = bottom + 1;
+      const frame = { width: 380, height: 220, left: 48, under: 30 };
+      const { canvas, x, y } = axes(frame, xs, [bottom, top], { format: key === "coverage" ? (v) => number(v * 100, 0) + " %" : compact, label: `${title} against evaluations: ends at ${format(ys[ys.length - 1])}` });
+      const path = points.map(([px, py], i) => `${i ? "L" : "M"}${x(px).toFixed(1)} ${y(py).toFixed(1)}`).join("");
+      canvas.append(svg("path", { class: "area", d: `${path}L${x(points[points.length - 1][0])} ${frame.height - frame.under}L${x(points[0][0])} ${frame.height - frame.under}Z` }), svg("path", { class: "line", d: path }));
+      const hair = svg("line", { class: "hair", y1: 8, y2: frame.height - frame.under, visibility: "hidden" }), dot = svg("circle", { class: "dot", r: 4.5, visibility: "hidden" });
+      canvas.append(hair, dot);
+      const output = el("output", {}, format(ys[ys.length - 1]));
+      $("curves").append(el("div", { class: "curve" }, el("h3", {}, title, output), canvas));
+      moves.push((i) => {
+        const visible = i !== null && data.history[key][i] !== null;
+        for (const mark of [hair, dot]) mark.setAttribute("visibility", visible ? "visible" : "hidden");
+        output.textContent = visible ? `${format(data.history[key][i])} at ${compact(xs[i])}` : format(ys[ys.length - 1]);
+        if (!visible) return;
+        hair.setAttribute("x1", x(xs[i]));
+        hair.setAttribute("x2", x(xs[i]));
+        dot.setAttribute("cx", x(xs[i]));
+        dot.setAttribute("cy", y(data.history[key][i]));
+      });
+      canvas.addEventListener("pointermove", (event) => {
+        const box = canvas.getBoundingClientRect();
+        const at = xs[0] + ((event.clientX - box.left) / box.width * frame.width - frame.left) / (frame.width - frame.left - 8) * (xs[xs.length - 1] - xs[0]);
+        let nearest = 0;
+        xs.forEach((v, i) => { if (Math.abs(v - at) < Math.abs(xs[nearest] - at)) nearest = i; });
+        moves.forEach((move) => move(nearest));
+      });
+      canvas.addEventListener("pointerleave", () => moves.forEach((move) => move(null)));
+    }
+  }
+  function drawPeople() {
+    const { fractions, curves } = data.recorded_play;
+    const frame = { width: 520, height: 300, left: 48, under: 46 };
+    const all = curves.flatMap((curve) => curve.values).filter((v) => v !== null);
+    const percent = (v) => number(v * 100, 0) + " %";
+    const { canvas, x, y } = axes(frame, fractions, [Math.min(...all, 0.4), 1], { format: percent, formatX: percent, label: curves.map((curve) => `${curve.label}: ${curve.values.map((v) => number(v, 2)).join(", ")}`).join(". ") });
+    const colours = ["var(--warm)", "var(--accent)", "var(--k-fish)", "var(--k-leaf)", "var(--soft)"];
+    const legend = el("p", { class: "about" });
+    curves.forEach((curve, i) => {
+      const colour = colours[i % colours.length], dash = i % 2 ? "none" : "6 4";
+      const points = curve.values.map((v, n) => [fractions[n], v]).filter(([, v]) => v !== null);
+      const line = svg("path", { class: "line", d: points.map(([px, py], n) => `${n ? "L" : "M"}${x(px).toFixed(1)} ${y(py).toFixed(1)}`).join("") });
+      line.style.stroke = colour;
+      line.style.strokeDasharray = dash;
+      canvas.append(line);
+      for (const [px, py] of points) {
+        const dot = svg("circle", { class: "dot", r: 4, cx: x(px), cy: y(py) }, svg("title"));
+        dot.firstChild.textContent = `${curve.label}, ${percent(px)} observed: ${number(py, 3)}`;
+        dot.style.fill = colour;
+        canvas.append(dot);
+      }
+      const key = el("span", {}, "● ");
+      key.style.color = colour;
+      legend.append(key, curve.label, i < curves.length - 1 ? "\u2003" : "");
+    });
+    const caption = svg("text", { x: frame.left + (frame.width - frame.left) / 2, y: frame.height - 6, "text-anchor": "middle" });
+    caption.textContent = "share of the walk observed →";
+    canvas.append(caption);
+    $("people").append(el("h3", {}, "Goals read correctly"), canvas, legend);
+  }
+
+  drawMap();
+  listen();
+  pin(cells[0]);
+  if ($("conditions")) drawConditions();
+  drawBest();
+  if ($("curves")) drawCurves();
+  if ($("people")) drawPeople();
+})();
