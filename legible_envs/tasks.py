@@ -8,6 +8,7 @@ and those weights follow from dynamic programming over task states, without list
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
@@ -158,7 +159,7 @@ class TaskGraph:
     def __hash__(self) -> int:
         return hash((self.subtasks, self.start, tuple(sorted(self.groups.items())), self.max_open))
 
-    # -- what is valid ------------------------------------------------------------------------------------------------
+    # -- what is valid -------------------------------------------------------------------------------------------------
 
     def _check_names(self) -> None:
         if not self.subtasks:
@@ -200,7 +201,7 @@ class TaskGraph:
             cycle = path[path.index(path[-1]) :]
             raise TaskError("the precedence has a cycle: " + " waits for ".join(cycle))
 
-    # -- dynamic programming over task states ---------------------------------------------------------------------------
+    # -- dynamic programming over task states --------------------------------------------------------------------------
 
     @cached_property
     def _classes(self) -> tuple[_Class, ...]:
@@ -250,7 +251,7 @@ class TaskGraph:
         ]
 
     def _steps(self, state: _State) -> list[tuple[int, str, float, _State]]:
-        """``(class, goal, multiplicity, next state)`` of every step possible by precedence; multiplicity counts copies."""
+        """``(class, goal, multiplicity, next state)`` of every possible step; multiplicity counts copies."""
         done, _ = state
         steps = []
         for i in self._ready(done):
@@ -314,7 +315,7 @@ class TaskGraph:
                     weights[state[1], goals, goal, self._classes[i].then] += visits[state] * probability
         return tuple(Transition(*key, weight) for key, weight in sorted(weights.items()))
 
-    # -- what users ask -------------------------------------------------------------------------------------------------
+    # -- what users ask ------------------------------------------------------------------------------------------------
 
     @property
     def num_sequences(self) -> int:
@@ -358,11 +359,11 @@ class TaskGraph:
         legs: dict[tuple[str, str], float] = defaultdict(float)
         for t in self._transitions:
             stops = (t.start, t.goal, *t.then)
-            for a, b in zip(stops[:-1], stops[1:], strict=True):
+            for a, b in itertools.pairwise(stops):
                 legs[a, b] += t.weight
         return dict(legs)
 
-    # -- in and out -------------------------------------------------------------------------------------------------------
+    # -- in and out ----------------------------------------------------------------------------------------------------
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data that :meth:`from_dict` reads back; the structure of the YAML files."""
@@ -443,7 +444,7 @@ class TaskGraph:
         """The precedence graph; an edge runs from each subtask to the subtasks that wait for it."""
         import networkx as nx
 
-        graph = nx.DiGraph(start=self.start, max_open=self.max_open)
+        graph: nx.DiGraph = nx.DiGraph(start=self.start, max_open=self.max_open)
         group_of = {member: group for group, members in self.groups.items() for member in members}
         for s in self.subtasks:
             graph.add_node(s.name, goals=s.goals, then=s.then, count=s.count, group=group_of.get(s.name))

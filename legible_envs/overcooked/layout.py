@@ -118,7 +118,7 @@ class OvercookedLayout:
         row, col = np.argwhere(self._cells == FLOOR)[0]
         return int(row), int(col)
 
-    # -- reading and writing ----------------------------------------------------------------------------------------------
+    # -- reading and writing -------------------------------------------------------------------------------------------
 
     @classmethod
     def from_ascii(cls, text: str) -> OvercookedLayout:
@@ -161,7 +161,8 @@ class OvercookedLayout:
                 else:
                     hint = f" (did you mean {_STRAY[symbol]!r}?)" if symbol in _STRAY else ""
                     raise LayoutError(
-                        f"row {r}, column {c}: unknown symbol {symbol!r}{hint}; expected one of {SYMBOLS!r} or a player's digit",
+                        f"row {r}, column {c}: unknown symbol {symbol!r}{hint}; "
+                        f"expected one of {SYMBOLS!r} or a player's digit",
                         rule="symbol",
                         cell=(r, c),
                     )
@@ -198,7 +199,7 @@ class OvercookedLayout:
             rows[r][c] = str(number)
         return "\n".join("".join(row) for row in rows)
 
-    # -- what is where ------------------------------------------------------------------------------------------------------
+    # -- what is where -------------------------------------------------------------------------------------------------
 
     @property
     def cells(self) -> npt.NDArray[np.int8]:
@@ -280,7 +281,7 @@ class OvercookedLayout:
                     queue.append(following)
         return distances
 
-    # -- changed copies -------------------------------------------------------------------------------------------------------
+    # -- changed copies ------------------------------------------------------------------------------------------------
 
     def with_cells(self, changes: Mapping[Cell, int | str]) -> OvercookedLayout:
         """A copy with some cells replaced, given as codes, symbols or station types; players' starts stay."""
@@ -295,7 +296,7 @@ class OvercookedLayout:
         """A copy whose players start elsewhere."""
         return OvercookedLayout(self._cells, starts)
 
-    # -- value semantics --------------------------------------------------------------------------------------------------------
+    # -- value semantics -----------------------------------------------------------------------------------------------
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, OvercookedLayout):

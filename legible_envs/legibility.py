@@ -1,0 +1,329 @@
+"""The legibility of a workspace, in plain Python: the definition every fast kernel is tested against.
+
+Equations are those of Tung, Luebbers, Roncone and Hayes, *Workspace Optimization Techniques to Improve Prediction of
+Human Motion During Human-Robot Collaboration* (HRI 2024). A person walks from a start to a goal along an optimal path,
+each optimal path equally likely. After every step an observer forms the posterior over the valid goals (Eq. 1). The
+walk is legible where the true goal leads by a margin, and costs the more the later the observer still cannot tell
+(Eq. 2). Eq. 3 adds this up over all stages of a task.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+from collections import defaultdict
+from collections.abc import Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple, TypeVar
+
+from legible_envs.tasks import TaskGraph
+
+__all__ = [
+    "From",
+    "Graph",
+    "PrefixScore",
+    "PrefixSpec",
+    "Ties",
+    "check_prefix",
+    "env_legibility",
+    "goal_legibility",
+    "optimal_costs",
+    "posterior",
+    "prefix_weights",
+    "task_legibility",
+    "tied_goals",
+]
+
+Node = Hashable
+Graph = Mapping[Node, Mapping[Node, float]]
+"""A directed graph: ``graph[a][b]`` is the cost of the step from ``a`` to ``b`` (> 0)."""
+
+
+class From(NamedTuple):
+    """The node of a place as somewhere to leave: a person does not walk through the station they left."""
+
+    place: str
+
+
+PrefixSpec = Literal["mean", "sum"] | tuple[float, ...]
+Ties = Literal["expected", "strict"]
+Goal = TypeVar("Goal", bound=Hashable)
+
+
+def posterior(
+    remaining: Mapping[Goal, float],
+    optimal: Mapping[Goal, float],
+    beta: float = 1.0,
+    prior: Mapping[Goal, float] | None = None,
+) -> dict[Goal, float]:
+    """Eq. 1: the probability of each goal given a prefix ``S -> Q``.
+
+    ``P(G | S->Q) ∝ P(G) exp(-beta (C(S->Q) + C*(Q->G) - C*(S->G)))``; the cost so far, ``C(S->Q)``, is the same for
+    every goal and cancels.
+
+    Args:
+        remaining: ``C*(Q->G)`` for every candidate goal; ``inf`` where there is no way.
+        optimal: ``C*(S->G)`` for the same goals.
+        beta: Rationality, per unit of cost.
+        prior: Prior probability of each goal; uniform if None.
+
+    Returns:
+        Probabilities in the order of ``remaining``; they sum to one.
+    """
+    excess = {goal: remaining[goal] - optimal[goal] for goal in remaining}
+    least = min(excess.values())
+    weights = {
+        goal: (1.0 if prior is None else prior[goal]) * math.exp(-beta * (value - least))
+        for goal, value in excess.items()
+    }
+    total = math.fsum(weights.values())
+    return {goal: weight / total for goal, weight in weights.items()}
+
+
+def tied_goals(
+    remaining: Mapping[Goal, float], optimal: Mapping[Goal, float], tie_tolerance: float = 1e-9
+) -> list[Goal]:
+    """Goals that share the top of the posterior: their excess cost is within ``tie_tolerance`` of the least."""
+    excess = {goal: remaining[goal] - optimal[goal] for goal in remaining}
+    least = min(excess.values())
+    return [goal for goal, value in excess.items() if value - least <= tie_tolerance]
+
+
+def env_legibility(
+    goal: Goal,
+    remaining: Mapping[Goal, float],
+    optimal: Mapping[Goal, float],
+    step: float,
+    *,
+    beta: float = 1.0,
+    c: float = 1.0,
+    ties: Ties = "expected",
+    tie_tolerance: float = 1e-9,
+) -> float:
+    """Eq. 2: how legible one prefix of a walk to ``goal`` is.
+
+    The margin ``p(1) - p(2)`` if the most probable goal is the true one, else ``-c * step``. Where ``k`` goals tie at
+    the top, the true one among them, the value is the expectation under uniform tie-breaking, ``-(k-1)/k * c * step``
+    (a tie has no margin), or ``-c * step`` with ``ties="strict"``. With one candidate ``p(2) = 0``.
+
+    Args:
+        goal: The true goal.
+        remaining: ``C*(Q->G)`` for every valid goal.
+        optimal: ``C*(S->G)`` for every valid goal.
+        step: How much of the walk was observed, in the unit of ``c``.
+        beta: Rationality, per unit of cost.
+        c: Cost of each observed unit without knowing the goal.
+        ties: ``"expected"`` or ``"strict"``.
+        tie_tolerance: Costs this close count as equal.
+    """
+    top = tied_goals(remaining, optimal, tie_tolerance)
+    if goal not in top:
+        return -c * step
+    if len(top) > 1:
+        return -c * step * (1.0 if ties == "strict" else (len(top) - 1) / len(top))
+    probabilities = posterior(remaining, optimal, beta)
+    return probabilities[goal] - max((p for g, p in probabilities.items() if g != goal), default=0.0)
+
+
+def check_prefix(prefix: str | float | Iterable[float]) -> PrefixSpec:
+    """Return a valid ``prefix`` setting: ``"mean"``, ``"sum"`` or a tuple of fractions in (0, 1].
+
+    Raises:
+        ValueError: Anything else.
+    """
+    if isinstance(prefix, str):
+        if prefix == "mean":
+            return "mean"
+        if prefix == "sum":
+            return "sum"
+        raise ValueError(f"prefix must be 'mean', 'sum' or a tuple of fractions in (0, 1], got {prefix!r}")
+    fractions = tuple(float(f) for f in (prefix if isinstance(prefix, Iterable) else (prefix,)))
+    if not fractions or not all(0 < f <= 1 for f in fractions):
+        raise ValueError(f"prefix must be 'mean', 'sum' or a tuple of fractions in (0, 1], got {prefix!r}")
+    return fractions
+
+
+def prefix_weights(prefix: PrefixSpec, length: int) -> list[float]:
+    """Weight of each prefix ``t = 1 … length-1`` of a walk of ``length`` steps.
+
+    ``"mean"`` weighs all equally (sum 1), ``"sum"`` gives each weight 1, and fractions ``f`` share weight 1 equally
+    among the prefixes ``t = clip(round(f * length), 1, length-1)``.
+    """
+    steps = length - 1
+    if prefix == "mean":
+        return [1.0 / steps] * steps
+    if prefix == "sum":
+        return [1.0] * steps
+    weights = [0.0] * steps
+    for fraction in prefix:
+        weights[min(max(round(float(fraction) * length), 1), steps) - 1] += 1.0 / len(prefix)
+    return weights
+
+
+def optimal_costs(graph: Graph, goal: Node) -> dict[Node, float]:
+    """Cost of the best way from every node to ``goal`` (Dijkstra); nodes without a way are absent."""
+    reverse: dict[Node, list[tuple[Node, float]]] = defaultdict(list)
+    for a, edges in graph.items():
+        for b, cost in edges.items():
+            reverse[b].append((a, cost))
+    best: dict[Node, float] = {}
+    queue: list[tuple[float, int, Node]] = [(0.0, 0, goal)]
+    pushed = 0
+    while queue:
+        cost, _, node = heapq.heappop(queue)
+        if node in best:
+            continue
+        best[node] = cost
+        for before, step in reverse[node]:
+            if before not in best:
+                pushed += 1
+                heapq.heappush(queue, (cost + step, pushed, before))
+    return best
+
+
+@dataclass(frozen=True, slots=True)
+class PrefixScore:
+    """One thing an observer may see on the way to a goal.
+
+    Attributes:
+        step: Steps observed, ``t``.
+        node: Where the person is then.
+        length: Steps of the whole walk.
+        probability: Share of all optimal walks that are here after ``step`` steps and have this length.
+        weight: Weight of this prefix in the walk's score.
+        tied: Goals at the top of the posterior.
+        value: Eq. 2.
+    """
+
+    step: int
+    node: Node
+    length: int
+    probability: float
+    weight: float
+    tied: tuple[Hashable, ...]
+    value: float
+
+
+def goal_legibility(
+    graph: Graph,
+    start: Node,
+    goal: Node,
+    goals: Sequence[Node],
+    *,
+    prefix: PrefixSpec = "mean",
+    beta: float = 1.0,
+    c: float = 1.0,
+    ties: Ties = "expected",
+    tie_tolerance: float = 1e-9,
+) -> list[PrefixScore]:
+    """Every prefix of every optimal walk ``start -> goal``, its probability under uniform choice, and its Eq. 2.
+
+    The expected legibility of the reach is ``sum(s.probability * s.weight * s.value)``. Walks may differ in length
+    where step costs differ, so probabilities are resolved by step and by length.
+
+    Args:
+        graph: Step costs. No edge leads to the start, none leaves a goal.
+        start: Where the walk begins (step 0).
+        goal: The true goal.
+        goals: All valid goals.
+        prefix: Which prefixes count, see :func:`prefix_weights`.
+        beta: See :func:`env_legibility`.
+        c: See :func:`env_legibility`.
+        ties: See :func:`env_legibility`.
+        tie_tolerance: See :func:`env_legibility`; also decides which paths count as equally short.
+
+    Raises:
+        ValueError: A goal cannot be reached from the start.
+    """
+    costs = {g: optimal_costs(graph, g) for g in goals}
+    unreachable = [g for g in goals if start not in costs[g]]
+    if unreachable:
+        raise ValueError(f"no way from {start!r} to {unreachable}")
+    optimal = {g: costs[g][start] for g in goals}
+    onward = {
+        node: [
+            after
+            for after, step in graph[node].items()
+            if after in costs[goal] and step + costs[goal][after] - best <= tie_tolerance
+        ]
+        for node, best in costs[goal].items()
+    }
+    departing, arriving = _count_walks(onward, start, goal)
+    lengths = [length for length, layer in enumerate(departing) if goal in layer]
+    total = sum(departing[length][goal] for length in lengths)
+    scores = []
+    for length in lengths:
+        weights = prefix_weights(prefix, length)
+        for step in range(1, length):
+            for node in departing[step].keys() & arriving[length - step].keys():
+                probability = departing[step][node] * arriving[length - step][node] / total
+                remaining = {g: costs[g].get(node, math.inf) for g in goals}
+                value = env_legibility(
+                    goal, remaining, optimal, step, beta=beta, c=c, ties=ties, tie_tolerance=tie_tolerance
+                )
+                tied = tuple(tied_goals(remaining, optimal, tie_tolerance))
+                scores.append(PrefixScore(step, node, length, probability, weights[step - 1], tied, value))
+    return scores
+
+
+_Layers = list[dict[Node, int]]
+
+
+def _count_walks(onward: Mapping[Node, Sequence[Node]], start: Node, goal: Node) -> tuple[_Layers, _Layers]:
+    """Number of walks ``start -> node`` by steps taken, and ``node -> goal`` by steps left (exact integers)."""
+    before: dict[Node, list[Node]] = defaultdict(list)
+    for node, following in onward.items():
+        for after in following:
+            before[after].append(node)
+    return _layers(onward, start), _layers(before, goal)
+
+
+def _layers(edges: Mapping[Node, Sequence[Node]], origin: Node) -> _Layers:
+    layers: _Layers = [{origin: 1}]
+    while layers[-1]:
+        following: dict[Node, int] = defaultdict(int)
+        for node, ways in layers[-1].items():
+            for after in edges.get(node, ()):
+                following[after] += ways
+        layers.append(dict(following))
+    return layers
+
+
+def task_legibility(
+    graph: Graph,
+    task: TaskGraph,
+    *,
+    prefix: PrefixSpec = "mean",
+    beta: float = 1.0,
+    c: float = 1.0,
+    ties: Ties = "expected",
+    tie_tolerance: float = 1e-9,
+) -> float:
+    """Eq. 3 per sequence: ``sum over stages (S, V) of w(S, V) * sum over G in V of E[EnvLegibility]``.
+
+    Args:
+        graph: Step costs, with a node ``name`` for every goal of the task and a node ``From(name)`` for every place
+            where the person may stand when choosing the next.
+        task: The task, whose stage weights ``w`` are exact.
+        prefix: See :func:`prefix_weights`.
+        beta: See :func:`env_legibility`.
+        c: See :func:`env_legibility`.
+        ties: See :func:`env_legibility`.
+        tie_tolerance: See :func:`env_legibility`.
+    """
+    total = []
+    for stage in task.stages():
+        for goal in stage.goals:
+            scores = goal_legibility(
+                graph,
+                From(stage.start),
+                goal,
+                stage.goals,
+                prefix=prefix,
+                beta=beta,
+                c=c,
+                ties=ties,
+                tie_tolerance=tie_tolerance,
+            )
+            total += [stage.weight * s.probability * s.weight * s.value for s in scores]
+    return math.fsum(total)

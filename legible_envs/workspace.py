@@ -1,0 +1,358 @@
+"""The design problem: which layouts are allowed, how they vary, and what they score.
+
+A search only ever talks to a :class:`Workspace`; it does not know whether it arranges a kitchen or a table. Third-party
+workspaces subclass it and register under the entry point group ``legible.workspaces``.
+"""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from importlib.metadata import entry_points
+from typing import Any, ClassVar, Final, Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["Objective", "ObjectiveName", "Workspace", "make_workspace", "register_workspace"]
+
+ObjectiveName = Literal["legibility", "efficiency", "legible-efficient"]
+Array = npt.NDArray[np.float64]
+
+CALIBRATION_SEED: Final = 20240311
+CALIBRATION_SIZE: Final = 1000
+
+
+class Workspace(ABC):
+    """Which layouts are allowed, how they vary, and what they score.
+
+    ``d`` is :attr:`genome_size`, ``n`` a batch size. All methods on genomes take ``(n, d)`` arrays; rows that are not
+    valid layouts score NaN.
+
+    Attributes:
+        name: Short name used in configurations, such as ``"overcooked"``.
+        phases: Number of phases of a climb; :meth:`perturb` varies something else in each.
+        measure_names: Names of the two measures an archive is laid out by.
+    """
+
+    name: ClassVar[str]
+    phases: int = 1
+    measure_names: tuple[str, str]
+
+    # -- genomes ---------------------------------------------------------------------------------------------------
+
+    @property
+    @abstractmethod
+    def genome_dtype(self) -> np.dtype[Any]:
+        """Data type of genomes."""
+
+    @property
+    @abstractmethod
+    def lower_bounds(self) -> npt.NDArray[Any]:
+        """``(d,)`` least value of each gene."""
+
+    @property
+    @abstractmethod
+    def upper_bounds(self) -> npt.NDArray[Any]:
+        """``(d,)`` greatest value of each gene, inclusive."""
+
+    @property
+    def genome_size(self) -> int:
+        """Number of genes, ``d``."""
+        return len(self.lower_bounds)
+
+    @abstractmethod
+    def decode(self, genome: npt.ArrayLike) -> Any:
+        """The layout of one ``(d,)`` genome.
+
+        Raises:
+            LayoutError: The genome breaks a rule, which the message names.
+        """
+
+    @abstractmethod
+    def encode(self, layout: Any) -> npt.NDArray[Any]:
+        """The ``(d,)`` genome of a layout.
+
+        Raises:
+            LayoutError: The layout cannot be expressed under the rules of this workspace.
+        """
+
+    @abstractmethod
+    def sample(self, n: int, rng: np.random.Generator) -> npt.NDArray[Any]:
+        """``(n, d)`` random valid genomes."""
+
+    @abstractmethod
+    def perturb(self, genomes: npt.NDArray[Any], k: int, rng: np.random.Generator, phase: int = 0) -> npt.NDArray[Any]:
+        """``(n * k, d)`` valid children, ``k`` of each of the ``(n, d)`` parents, grouped by parent."""
+
+    @abstractmethod
+    def valid(self, genomes: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
+        """``(n,)`` which genomes are valid layouts."""
+
+    # -- what they score -------------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def scores(self, genomes: npt.NDArray[Any]) -> tuple[Array, Array]:
+        """``(n,)`` legibility and ``(n,)`` distance; NaN where invalid."""
+
+    @abstractmethod
+    def measures(self, genomes: npt.NDArray[Any]) -> Array:
+        """``(n, 2)`` what an archive is laid out by."""
+
+    @property
+    @abstractmethod
+    def archive_dims(self) -> tuple[int, int]:
+        """Number of archive cells along each measure."""
+
+    @property
+    @abstractmethod
+    def archive_ranges(self) -> list[tuple[float, float]]:
+        """Lower and upper end of each measure."""
+
+    def legibility(self, genomes: npt.NDArray[Any]) -> Any:
+        """``(n,)`` legibility per task execution (Eq. 3 of Tung et al., 2024); NaN where invalid.
+
+        One ``(d,)`` genome gives one number, and raises :class:`~legible_envs.errors.LayoutError` if it is invalid.
+        """
+        return self._score(genomes, 0)
+
+    def distance(self, genomes: npt.NDArray[Any]) -> Any:
+        """``(n,)`` expected length of all walks of one task execution; NaN where invalid; one number for one genome."""
+        return self._score(genomes, 1)
+
+    def _score(self, genomes: npt.NDArray[Any], which: int) -> Any:
+        if np.ndim(genomes) != 1:
+            return self.scores(genomes)[which]
+        self.decode(genomes)
+        return float(self.scores(np.asarray(genomes)[None])[which][0])
+
+    def penalty(self, genomes: npt.NDArray[Any]) -> Array:
+        """``(n,)`` what an objective subtracts from the score, in its unit; zero unless a workspace says otherwise."""
+        return np.zeros(len(genomes))
+
+    @cached_property
+    def calibration(self) -> dict[str, float]:
+        """Mean and standard deviation of legibility and distance over 1,000 random layouts with a fixed seed."""
+        genomes = self.sample(CALIBRATION_SIZE, np.random.default_rng(CALIBRATION_SEED))
+        legibility, distance = self.scores(genomes)
+        return {
+            "legibility_mean": float(np.nanmean(legibility)),
+            "legibility_sd": float(np.nanstd(legibility)),
+            "distance_mean": float(np.nanmean(distance)),
+            "distance_sd": float(np.nanstd(distance)),
+        }
+
+    def objective(self, name: ObjectiveName = "legibility", max_distance: float | None = None) -> Objective:
+        """What a search maximises, as a callable ``(n, d) -> (n,)``; see :class:`Objective`."""
+        return Objective(self, name, max_distance)
+
+    @property
+    def score_floor(self) -> float:
+        """Floor of the ``legibility`` objective; see :attr:`Objective.floor`."""
+        return self.objective("legibility").floor
+
+    # -- finished layouts ------------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def simplifications(self, genome: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """``(m, d)`` genomes that each lack one obstacle of the given ``(d,)`` one."""
+
+    def prune(self, genome: npt.NDArray[Any], objective: Objective | None = None) -> npt.NDArray[Any]:
+        """Remove obstacles one by one as long as that does not lower the objective.
+
+        Args:
+            genome: ``(d,)`` a valid genome.
+            objective: What must not fall; legibility if None.
+        """
+        objective = objective or self.objective("legibility")
+        genome = np.array(genome, dtype=self.genome_dtype)
+        best = float(objective(genome[None])[0])
+        while len(simpler := self.simplifications(genome)):
+            scores = objective(simpler)
+            scores = np.where(np.isnan(scores), -np.inf, scores)
+            choice = int(np.argmax(scores))
+            # A score that differs in the last bits only is the same score, summed in another order.
+            if scores[choice] < best - 1e-9 * max(1.0, abs(best)):
+                break
+            genome, best = simpler[choice], max(best, float(scores[choice]))
+        return genome
+
+    @abstractmethod
+    def summary(self, genome: npt.ArrayLike) -> dict[str, Any]:
+        """Score, distance and what belongs beside them, of one genome; plain data."""
+
+    @abstractmethod
+    def explain(self, genome: npt.ArrayLike) -> list[dict[str, Any]]:
+        """Where one layout wins and loses its score: a row per stage and goal; plain data."""
+
+    # -- configuration ---------------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def to_config(self) -> dict[str, Any]:
+        """Settings as JSON-ready data with the key ``"workspace"``; :func:`make_workspace` reads them back."""
+
+    def __eq__(self, other: object) -> bool:
+        return type(self) is type(other) and self.to_config() == other.to_config()  # type: ignore[attr-defined]
+
+    def __hash__(self) -> int:
+        return hash(repr(sorted(self.to_config().items())))
+
+    def __repr__(self) -> str:
+        settings = {key: value for key, value in self.to_config().items() if key != "workspace"}
+        return f"{type(self).__name__}({', '.join(f'{key}={value!r}' for key, value in settings.items())})"
+
+
+class Objective:
+    """What a search maximises: ``objective(genomes) -> (n,)``, NaN where invalid or beyond the distance cap.
+
+    ``"legibility"`` is Eq. 3, ``"efficiency"`` the negative distance, and ``"legible-efficient"`` the sum of both, each
+    standardised by the workspace's :attr:`~Workspace.calibration`. The workspace's penalty is subtracted from each.
+
+    Args:
+        workspace: The workspace that scores.
+        name: One of the three names.
+        max_distance: Layouts with a longer distance count as failures; None means no cap.
+
+    Raises:
+        ValueError: An unknown name, or a cap that is not a positive number.
+    """
+
+    def __init__(self, workspace: Workspace, name: ObjectiveName, max_distance: float | None = None) -> None:
+        if name not in get_args(ObjectiveName):
+            raise ValueError(f"unknown objective {name!r}; expected one of {list(get_args(ObjectiveName))}")
+        if max_distance is not None and not max_distance > 0:
+            raise ValueError(f"max_distance must be a positive number or None, got {max_distance!r}")
+        self.workspace = workspace
+        self.name = name
+        self.max_distance = max_distance
+
+    def __call__(self, genomes: npt.NDArray[Any]) -> Array:
+        """``(n,)`` values of ``(n, d)`` genomes."""
+        legibility, distance = self.workspace.scores(genomes)
+        values = self._combine(legibility, distance) - self.workspace.penalty(genomes)
+        if self.max_distance is not None:
+            values[distance > self.max_distance] = np.nan
+        return values
+
+    def _combine(self, legibility: Array, distance: Array) -> Array:
+        if self.name == "legibility":
+            return legibility
+        if self.name == "efficiency":
+            return -distance
+        scale = self.workspace.calibration
+        return (legibility - scale["legibility_mean"]) / scale["legibility_sd"] - (
+            distance - scale["distance_mean"]
+        ) / scale["distance_sd"]
+
+    @cached_property
+    def floor(self) -> float:
+        """A value far below what searches keep: ten standard deviations under the mean of random layouts.
+
+        Archives use it as ``qd_score_offset``, so that filling a cell counts even where scores are negative.
+        """
+        scale = self.workspace.calibration
+        if self.name == "legibility":
+            return scale["legibility_mean"] - 10 * scale["legibility_sd"]
+        if self.name == "efficiency":
+            return -scale["distance_mean"] - 10 * scale["distance_sd"]
+        return -20.0
+
+    def __repr__(self) -> str:
+        cap = "" if self.max_distance is None else f", max_distance={self.max_distance:g}"
+        return f"{type(self.workspace).__name__}.objective({self.name!r}{cap})"
+
+
+_BUILT_IN: Final[Mapping[str, str]] = {"overcooked": "legible_envs.overcooked.workspace:OvercookedWorkspace"}
+_registered: dict[str, type[Workspace] | str] = {}
+ENTRY_POINT_GROUP: Final = "legible.workspaces"
+
+
+def register_workspace(name: str, workspace: type[Workspace] | str) -> None:
+    """Make a workspace class known by name, for this process.
+
+    Args:
+        name: The name configurations use under ``"workspace"``.
+        workspace: The class, or ``"module:Class"``.
+    """
+    _registered[name] = workspace
+
+
+def make_workspace(config: Mapping[str, Any] | str, **settings: Any) -> Workspace:
+    """Build a workspace from a name or from what :meth:`Workspace.to_config` returned.
+
+    Args:
+        config: ``{"workspace": name, …settings}``, or the name alone: a built-in or registered one, one of an
+            installed package (entry point group ``legible.workspaces``), or ``"module:Class"``.
+        **settings: Further settings, which win.
+
+    Raises:
+        ValueError: Unknown name, unknown settings, or anything the workspace rejects.
+    """
+    merged = {"workspace": config} if isinstance(config, str) else dict(config)
+    merged.update(settings)
+    name = merged.pop("workspace", None)
+    if not isinstance(name, str):
+        raise ValueError("a workspace configuration needs the key 'workspace', e.g. {'workspace': 'overcooked'}")
+    cls = _find(name)
+    known = inspect.signature(cls).parameters
+    unknown = [key for key in merged if key not in known]
+    if unknown:
+        raise ValueError(f"unknown settings {unknown} of workspace {name!r}; it takes {list(known)}")
+    return cls(**merged)
+
+
+def _find(name: str) -> type[Workspace]:
+    target: type[Workspace] | str | None = _registered.get(name) or _BUILT_IN.get(name)
+    if target is None and ":" in name:
+        target = name
+    if target is None:
+        found = {point.name: point for point in entry_points(group=ENTRY_POINT_GROUP)}
+        if name not in found:
+            known = sorted({*_BUILT_IN, *_registered, *found})
+            raise ValueError(f"unknown workspace {name!r}; known: {known}, or 'module:Class'")
+        target = found[name].load()
+    if isinstance(target, str):
+        module, _, attribute = target.partition(":")
+        try:
+            target = getattr(importlib.import_module(module), attribute)
+        except (ImportError, AttributeError) as error:
+            raise ValueError(f"cannot load workspace {target!r}: {error}") from error
+    if not (isinstance(target, type) and issubclass(target, Workspace)):
+        raise ValueError(f"workspace {name!r} is {target!r}, which is not a subclass of Workspace")
+    return target
+
+
+def as_batch(genomes: npt.ArrayLike, size: int) -> npt.NDArray[Any]:
+    """Return genomes as an ``(n, size)`` array.
+
+    Raises:
+        ValueError: Another shape, or data that is not numeric.
+    """
+    array = np.asarray(genomes)
+    if array.ndim != 2 or array.shape[1] != size:
+        raise ValueError(f"expected genomes of shape (n, {size}), got {array.shape}")
+    if array.dtype.kind not in "biuf":
+        raise ValueError(f"expected numeric genomes, got dtype {array.dtype}")
+    return array
+
+
+def as_single(genome: npt.ArrayLike, size: int) -> npt.NDArray[Any]:
+    """Return one genome as a ``(1, size)`` batch; see :func:`as_batch`."""
+    array = np.asarray(genome)
+    if array.shape != (size,):
+        raise ValueError(f"expected one genome of shape ({size},), got {array.shape}")
+    return as_batch(array[None], size)
+
+
+def check_choice(name: str, value: Any, allowed: Sequence[Any]) -> Any:
+    """Return ``value`` if it is allowed.
+
+    Raises:
+        ValueError: It is not; the message names the parameter and what it may be.
+    """
+    if value not in allowed:
+        raise ValueError(f"{name} must be one of {list(allowed)}, got {value!r}")
+    return value
