@@ -1,0 +1,118 @@
+"""The archive of a search: a pyribs ``GridArchive`` with one cell per combination of a workspace's measures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+from ribs.archives import GridArchive
+
+from optimizers.files import write_atomically
+
+if TYPE_CHECKING:
+    from ribs.archives import ArchiveBase
+
+__all__ = ["FIELDS", "WorkspaceArchive", "archive_arrays", "make_archive", "read_archive", "write_archive"]
+
+FIELDS = ("solution", "objective", "measures", "index")
+"""Arrays of ``archive.npz``, one row per elite in ascending cell index."""
+
+
+class WorkspaceArchive(GridArchive):
+    """A ``GridArchive`` that passes over layouts without a score.
+
+    Layouts that score NaN (over the distance cap, say) are not added; ``add`` reports status 0 and value NaN for them.
+    Everything else is pyribs' own, so any scheduler, emitter and plot made for a ``GridArchive`` works.
+    """
+
+    def add(
+        self, solution: npt.ArrayLike, objective: npt.ArrayLike, measures: npt.ArrayLike, **fields: npt.ArrayLike
+    ) -> dict[str, npt.NDArray[Any]]:
+        """Insert a batch.
+
+        Args:
+            solution: ``(n, d)`` genomes.
+            objective: ``(n,)`` scores, NaN where a layout is not allowed.
+            measures: ``(n, k)`` measures; ignored where the score is NaN.
+            **fields: Extra fields as in ``GridArchive.add``.
+
+        Returns:
+            ``status`` ``(n,)`` (0 not added, 1 improved its cell, 2 filled a new cell) and ``value`` ``(n,)``.
+        """
+        scores = np.asarray(objective, dtype=np.float64)
+        scored = ~np.isnan(scores)
+        if scored.all() and scored.size:
+            return super().add(solution, scores, measures, **fields)
+        info = {"status": np.zeros(scores.shape, dtype=np.int32), "value": np.full(scores.shape, np.nan)}
+        if scored.any():
+            part = super().add(
+                np.asarray(solution)[scored],
+                scores[scored],
+                np.asarray(measures)[scored],
+                **{name: np.asarray(values)[scored] for name, values in fields.items()},
+            )
+            for name, values in part.items():
+                info[name][scored] = values
+        return info
+
+
+def make_archive(
+    workspace: Any,
+    *,
+    seed: int | np.random.SeedSequence | None = None,
+    score_floor: float | None = None,
+    **options: Any,
+) -> WorkspaceArchive:
+    """Make the archive that fits a workspace: integer genomes, one cell per combination of its measures.
+
+    Args:
+        workspace: The design problem; gives genome size and type, archive dimensions and ranges.
+        seed: Seed of the archive's own sampling.
+        score_floor: Subtracted from scores in the QD score, so that filling a cell never lowers it; default the
+            workspace's own lower bound.
+        **options: Passed on to ``ribs.archives.GridArchive`` (``dims``, ``ranges``, ``extra_fields``, ...).
+
+    Returns:
+        An empty archive.
+    """
+    settings: dict[str, Any] = {
+        "solution_dim": int(workspace.genome_size),
+        "dims": [int(n) for n in workspace.archive_dims],
+        "ranges": [(float(low), float(high)) for low, high in workspace.archive_ranges],
+        "qd_score_offset": float(workspace.score_floor if score_floor is None else score_floor),
+        "solution_dtype": workspace.genome_dtype,
+    }
+    return WorkspaceArchive(seed=seed, **{**settings, **options})
+
+
+def archive_arrays(archive: ArchiveBase) -> dict[str, npt.NDArray[Any]]:
+    """The elites as plain arrays (:data:`FIELDS`), in ascending cell index whatever the order they were found in."""
+    data = archive.data(list(FIELDS))
+    order = np.argsort(data["index"], kind="stable")
+    return {name: np.ascontiguousarray(data[name][order]) for name in FIELDS}
+
+
+def write_archive(path: Path, archive: ArchiveBase) -> None:
+    """Write ``archive.npz``: plain arrays, no pickle, replaced in one step."""
+    arrays: dict[str, Any] = archive_arrays(archive)
+    write_atomically(path, lambda stream: np.savez_compressed(stream, **arrays))
+
+
+def read_archive(path: Path) -> dict[str, npt.NDArray[Any]]:
+    """Read what :func:`write_archive` wrote.
+
+    Raises:
+        ValueError: The file is not such an archive.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            arrays = {name: stored[name] for name in FIELDS}
+    except (ValueError, KeyError, OSError, EOFError) as error:
+        if isinstance(error, FileNotFoundError):
+            raise
+        raise ValueError(f"{path} is not an archive written by a search ({error})") from error
+    if len({len(values) for values in arrays.values()}) != 1:
+        raise ValueError(f"{path} is not an archive written by a search (arrays of different lengths)")
+    return arrays

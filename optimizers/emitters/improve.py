@@ -1,0 +1,182 @@
+"""Algorithm 1 of the paper, "improve workspace", as a pyribs emitter that runs many climbs in lockstep."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+from ribs.emitters import EmitterBase
+
+if TYPE_CHECKING:
+    from ribs.archives import ArchiveBase
+
+__all__ = ["ImproveWorkspaceEmitter"]
+
+_BATCH = 2048
+_ROUNDS = 40
+
+
+class ImproveWorkspaceEmitter(EmitterBase):
+    """Hill climbs from random elites, each step to the best of a set of perturbations (Tung et al., HRI 2024).
+
+    Algorithm 2 of the paper draws a random elite and hands it to Algorithm 1: perturb the layout, offer every
+    perturbation to the archive, continue from the best one if it is strictly better, else stop. Here ``climbs`` such
+    climbs take one step per ``ask``/``tell``, so that layouts are scored and archived in large batches; with
+    ``climbs=1`` this is the literal algorithm. A workspace with several phases (cubes first, then obstacles) is climbed
+    in one phase until nothing is better, then in the next.
+
+    On an empty archive ``ask`` proposes random layouts instead (the initialisation of Algorithm 2).
+
+    Args:
+        archive: Archive the elites are drawn from.
+        workspace: The design problem; must offer ``sample``, ``perturb`` and ``phases``.
+        climbs: Climbs in lockstep. Default: as many as make batches of about 2,048 layouts, but few enough for 40
+            rounds within ``evaluations`` and for ten climbs one after the other within ``iterations``.
+        fanout: Perturbations per climb and step.
+        iterations: Climbs to run in all; ``done`` is true after that. None: no end.
+        evaluations: Planned number of evaluations, used only for the default of ``climbs``.
+        initial: Random layouts proposed while the archive is empty.
+        seed: Seed of this emitter's draws: elites, perturbations, random layouts.
+
+    Attributes:
+        climbs: Climbs in lockstep.
+        fanout: Perturbations per climb and step.
+        started: Climbs begun so far.
+        finished: Climbs that have ended so far.
+    """
+
+    emits_valid = True
+
+    def __init__(
+        self,
+        archive: ArchiveBase,
+        workspace: Any,
+        *,
+        climbs: int | None = None,
+        fanout: int = 32,
+        iterations: int | None = None,
+        evaluations: int | None = None,
+        initial: int = 1000,
+        seed: int | np.random.SeedSequence | None = None,
+    ) -> None:
+        for name, value in (("climbs", climbs), ("fanout", fanout), ("initial", initial)):
+            if value is not None and value < 1:
+                raise ValueError(f"{name} must be at least 1, got {value}")
+        if iterations is not None and iterations < 0:
+            raise ValueError(f"iterations must not be negative, got {iterations}")
+        super().__init__(
+            archive,
+            solution_dim=archive.solution_dim,
+            bounds=None,
+            lower_bounds=workspace.lower_bounds,
+            upper_bounds=workspace.upper_bounds,
+        )
+        self.climbs = int(climbs) if climbs is not None else _default_climbs(fanout, evaluations, iterations)
+        self.fanout = int(fanout)
+        self.started = 0
+        self.finished = 0
+        self._workspace = workspace
+        self._limit = iterations
+        self._initial = int(initial)
+        self._rng = np.random.default_rng(seed)
+        # One row per climb: where it stands, what that scores, the phase it is in, whether it is still climbing.
+        self._genomes = np.zeros((self.climbs, int(archive.solution_dim)), dtype=archive.dtypes["solution"])
+        self._scores = np.zeros(self.climbs)
+        self._phase = np.zeros(self.climbs, dtype=np.int64)
+        self._climbing = np.zeros(self.climbs, dtype=bool)
+        self._asked: npt.NDArray[np.int64] | None = None
+
+    @property
+    def done(self) -> bool:
+        """Whether all ``iterations`` climbs have ended."""
+        return self._limit is not None and self.finished >= self._limit
+
+    @property
+    def settings(self) -> dict[str, int]:
+        """The settings in force, defaults resolved, for the manifest of a run."""
+        return {"climbs": self.climbs, "fanout": self.fanout}
+
+    def ask(self) -> npt.NDArray[Any]:
+        """Propose the next step of every climb.
+
+        Returns:
+            ``(m * fanout, d)`` valid genomes grouped by climb, ``m`` the number of climbs under way; empty when done.
+        """
+        if self.archive.empty:
+            self._asked = None
+            return self._workspace.sample(self._initial, self._rng)
+        self._begin_climbs()
+        self._asked = np.flatnonzero(self._climbing)
+        children = np.empty((len(self._asked), self.fanout, self._genomes.shape[1]), dtype=self._genomes.dtype)
+        for phase in range(int(self._workspace.phases)):
+            members = self._phase[self._asked] == phase
+            if members.any():
+                parents = self._genomes[self._asked[members]]
+                proposed = self._workspace.perturb(parents, self.fanout, self._rng, phase=phase)
+                children[members] = proposed.reshape(len(parents), self.fanout, -1)
+        return children.reshape(-1, self._genomes.shape[1])
+
+    def tell(
+        self,
+        solution: npt.ArrayLike,
+        objective: npt.ArrayLike,
+        measures: npt.ArrayLike,
+        add_info: dict[str, npt.NDArray[Any]],
+        **fields: npt.ArrayLike,
+    ) -> None:
+        """Move every climb to its best strictly better perturbation, into its next phase, or to its end.
+
+        Args:
+            solution: ``(m * fanout, d)`` what ``ask`` proposed.
+            objective: ``(m * fanout,)`` scores, NaN where a layout is not allowed.
+            measures: Not used.
+            add_info: Not used.
+            **fields: Not used.
+        """
+        rows = self._asked
+        if rows is None or not rows.size:
+            return
+        scores = np.asarray(objective, dtype=np.float64).reshape(len(rows), self.fanout)
+        scores = np.where(np.isnan(scores), -np.inf, scores)
+        children = np.asarray(solution).reshape(len(rows), self.fanout, -1)
+        each = np.arange(len(rows))
+        best = scores.argmax(axis=1)
+        better = scores[each, best] > self._scores[rows]
+        self._genomes[rows[better]] = children[each, best][better]
+        self._scores[rows[better]] = scores[each, best][better]
+        stuck = rows[~better]
+        self._phase[stuck] += 1
+        over = stuck[self._phase[stuck] >= self._workspace.phases]
+        self._climbing[over] = False
+        self.finished += len(over)
+
+    def _begin_climbs(self) -> None:
+        """Give every idle climb a random elite, as far as ``iterations`` allows.
+
+        Elites are drawn uniformly over occupied cells in order of cell index, not of arrival in the archive: the draw
+        then depends on what the archive holds alone.
+        """
+        idle = np.flatnonzero(~self._climbing)
+        if self._limit is not None:
+            idle = idle[: self._limit - self.started]
+        if not idle.size:
+            return
+        elites = self.archive.data(["index", "solution", "objective"])
+        order = np.argsort(elites["index"])
+        drawn = order[self._rng.integers(len(order), size=len(idle))]
+        self._genomes[idle] = elites["solution"][drawn]
+        self._scores[idle] = elites["objective"][drawn]
+        self._phase[idle] = 0
+        self._climbing[idle] = True
+        self.started += len(idle)
+
+
+def _default_climbs(fanout: int, evaluations: int | None, iterations: int | None) -> int:
+    """Climbs for batches of about ``_BATCH``, but few enough for each to make ``_ROUNDS`` steps within the budget."""
+    climbs = _BATCH // fanout
+    if evaluations is not None:
+        climbs = min(climbs, evaluations // (_ROUNDS * fanout))
+    if iterations is not None:
+        climbs = min(climbs, iterations // 10)
+    return max(1, climbs)

@@ -1,0 +1,51 @@
+"""What can go wrong in a search; every error that ends one carries what was found until then."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from optimizers.result import SearchResult
+
+__all__ = ["CheckpointError", "EmitterError", "SearchError", "SearchInterrupted"]
+
+
+class SearchError(RuntimeError):
+    """A search could not go on.
+
+    Attributes:
+        partial: The :class:`~optimizers.SearchResult` at that moment, or None where nothing had been found.
+    """
+
+    def __init__(self, message: str, *, partial: SearchResult | None = None) -> None:
+        super().__init__(message)
+        self.partial = partial
+
+
+class CheckpointError(SearchError):
+    """A checkpoint cannot be written, read, or continued with these settings; the message says what to do."""
+
+
+class SearchInterrupted(KeyboardInterrupt):
+    """Ctrl-C during a search, raised after the batch in progress was finished and everything saved.
+
+    Attributes:
+        partial: The :class:`~optimizers.SearchResult` at that moment.
+    """
+
+    def __init__(self, message: str, *, partial: SearchResult | None = None) -> None:
+        super().__init__(message)
+        self.partial = partial
+
+
+class EmitterError(ValueError):
+    """An emitter is unknown, or breaks the contract of :mod:`optimizers.emitters.registry`.
+
+    Attributes:
+        problems: Each thing wrong, in a sentence; a single one for errors raised while searching.
+    """
+
+    def __init__(self, message: str, *, problems: Sequence[str] = ()) -> None:
+        super().__init__(message)
+        self.problems = tuple(problems) or (message,)

@@ -1,0 +1,114 @@
+"""The seam between searching and scoring: genomes in, objective and measures out.
+
+Everything that proposes layouts stands on one side of :class:`Evaluator`, everything that judges them on the other,
+so that scoring can be spread over machines without an emitter noticing.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["Evaluator", "Objective"]
+
+Objective = Callable[[npt.NDArray[Any]], npt.NDArray[np.float64]]
+
+
+class Evaluator:
+    """Score and measure genomes of one workspace.
+
+    Args:
+        workspace: The design problem.
+        objective: Name known to ``workspace.objective``, or any callable from ``(n, d)`` genomes to ``(n,)`` numbers to
+            be maximised. NaN and negative infinity mean "not allowed": such a layout never enters an archive.
+        max_distance: Layouts that make the person walk farther than this (floor moves, expected over one task
+            execution) score NaN.
+
+    Attributes:
+        name: Name of the objective.
+        seconds: Wall time spent in the objective so far (measures not included).
+    """
+
+    def __init__(self, workspace: Any, objective: str | Objective = "legibility", max_distance: float | None = None):
+        self.workspace = workspace
+        self.max_distance = max_distance
+        self.seconds = 0.0
+        if isinstance(objective, str):
+            self.name = objective
+            self._score: Objective = workspace.objective(objective, max_distance=max_distance)
+            self._cap_here = False
+        elif callable(objective):
+            self.name = _name_of(objective)
+            self._score = objective
+            self._cap_here = max_distance is not None
+            self.max_distance = getattr(objective, "max_distance", None) if max_distance is None else max_distance
+        else:
+            raise TypeError(f"objective must be a name or a callable on genomes, got {type(objective).__name__}")
+
+    @property
+    def score_floor(self) -> float:
+        """A value no score lies below, as far as the objective or the workspace knows one."""
+        floor = getattr(self._score, "floor", None)
+        return float(self.workspace.score_floor if floor is None else floor)
+
+    def score(self, genomes: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
+        """The objective alone.
+
+        Args:
+            genomes: ``(n, d)``.
+
+        Returns:
+            ``(n,)`` scores, NaN where not allowed.
+
+        Raises:
+            ValueError: The objective returned another shape, or positive infinity.
+        """
+        started = time.perf_counter()
+        scores = np.asarray(self._score(genomes), dtype=np.float64)
+        if scores.shape != (len(genomes),):
+            raise ValueError(
+                f"objective {self.name!r} must return one number per genome, shape ({len(genomes)},); "
+                f"it returned shape {scores.shape}"
+            )
+        if np.isposinf(scores).any():
+            raise ValueError(f"objective {self.name!r} returned +inf; a score must be finite, or NaN where not allowed")
+        scores = np.where(np.isneginf(scores), np.nan, scores)
+        if self._cap_here:
+            too_far = ~(self.workspace.distance(genomes) <= self.max_distance)
+            scores = np.where(too_far, np.nan, scores)
+        self.seconds += time.perf_counter() - started
+        return scores
+
+    def __call__(self, genomes: npt.NDArray[Any]) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+        """Score and measure.
+
+        Args:
+            genomes: ``(n, d)``.
+
+        Returns:
+            ``(n,)`` scores and ``(n, k)`` measures; measures of layouts that score NaN are to be ignored.
+
+        Raises:
+            ValueError: The objective or the measures have a wrong shape, or a scored layout has no finite measures.
+        """
+        scores = self.score(genomes)
+        measures = np.asarray(self.workspace.measures(genomes), dtype=np.float64)
+        shape = (len(genomes), len(self.workspace.archive_dims))
+        if measures.shape != shape:
+            raise ValueError(f"workspace.measures must return shape {shape}, it returned {measures.shape}")
+        if not np.isfinite(measures[~np.isnan(scores)]).all():
+            raise ValueError("workspace.measures returned NaN or infinity for a layout that has a score")
+        return scores, measures
+
+
+def _name_of(objective: Objective) -> str:
+    """``objective.name`` where it has one, else where it was defined."""
+    name = getattr(objective, "name", None)
+    if isinstance(name, str):
+        return name
+    kind = objective if hasattr(objective, "__qualname__") else type(objective)
+    return f"{kind.__module__}:{kind.__qualname__}"
