@@ -1,0 +1,357 @@
+"""The playable kitchen as a Gymnasium environment."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import gymnasium as gym
+import numpy as np
+import numpy.typing as npt
+from gymnasium import spaces
+
+from legible_envs.overcooked import batch
+from legible_envs.overcooked.dynamics import CROSSINGS, DELIVERIES, STATE_SIZE
+from legible_envs.overcooked.layout import OvercookedLayout
+from legible_envs.overcooked.observations import grid_observation, vector_observation
+from legible_envs.overcooked.recipes import PAPER_SOUPS
+from legible_envs.overcooked.settings import JsonSpec, KitchenSettings, PackedKitchen, check_options, read_layout
+from legible_envs.overcooked.snapshot import draw_small, make_view, to_text
+from legible_envs.overcooked.view import GameView
+
+__all__ = ["OvercookedEnv"]
+
+NUM_ACTIONS = 6
+
+
+class OvercookedEnv(JsonSpec, gym.Env[npt.NDArray[Any], int]):
+    """A person cooks soups in a kitchen whose layout can be changed from episode to episode.
+
+    ## Description
+
+    One cook fetches ingredients, puts them in a pot, waits, puts the soup on a dish and serves it, until every ordered
+    soup is delivered: by default the three soups of Tung, Luebbers, Roncone and Hayes, *Workspace Optimization
+    Techniques to Improve Prediction of Human Motion During Human-Robot Collaboration* (HRI 2024), each once and in any
+    order. Virtual obstacles are projected on the floor to make the cook's walks easier to read. The game follows
+    Overcooked-AI (actions and their order, turning in place, counters that hold one item, a cook time of 20), with
+    three differences: recipes are data; a pot accepts only what can still become an ordered soup, and starts by itself
+    when one is complete; and an ingredient or empty dish can be put back where it came from, so that no state is a dead
+    end.
+
+    ## Action Space
+
+    `Discrete(6)`, in the order of Overcooked-AI:
+
+    | Num | Action   | Effect |
+    | --- | -------- | ------ |
+    | 0   | North    | turn north (row - 1), and move if the cell is free |
+    | 1   | South    | turn south (row + 1), and move if the cell is free |
+    | 2   | East     | turn east (column + 1), and move if the cell is free |
+    | 3   | West     | turn west (column - 1), and move if the cell is free |
+    | 4   | Stay     | nothing |
+    | 5   | Interact | take from or put back at a station, put on or pick up from a counter, add to a pot, take a soup with a dish, deliver |
+
+    ## Observation Space
+
+    With `obs_type="grid"` (default) a `Box` of `uint8` and shape `(H, W, 22 + R)` for `R` recipes; each cell has
+
+    | Channel | Content | Range |
+    | ------- | ------- | ----- |
+    | 0       | counter | 0, 1 |
+    | 1       | virtual obstacle | 0, 1 |
+    | 2 - 8   | station: tomato, onion, cabbage, fish, dish, pot, serving | 0, 1 |
+    | 9       | the player | 0, 1 |
+    | 10 - 13 | the player, facing north, south, east, west | 0, 1 |
+    | 14 - 17 | tomatoes, onions, cabbages, fish on the counter, in the player's hands, in the pot, or in the soup there | 0 - most in a recipe |
+    | 18      | a dish, empty or with soup | 0, 1 |
+    | 19      | a dish with soup | 0, 1 |
+    | 20      | ticks the pot has cooked | 0 - cook time (at most 255) |
+    | 21      | the pot's soup is ready | 0, 1 |
+    | 22 + r  | recipe r is not yet delivered (the same on all cells) | 0, 1 |
+
+    With `obs_type="vector"` a `Box` of `float32` in [-1, 1] and shape `(51 + R,)`, a summary for small networks; grids
+    tell everything, this leaves out which counter an item lies on, where obstacles are unless next to the player, and
+    which of several pots holds what:
+
+    | Index   | Content |
+    | ------- | ------- |
+    | 0, 1    | row / (H - 1), column / (W - 1) |
+    | 2 - 5   | facing north, south, east, west |
+    | 6 - 12  | hands: empty, tomato, onion, cabbage, fish, dish, soup |
+    | 13 - 16 | whether the cell to the north, south, east, west can be walked on |
+    | 17 - 37 | for tomato, onion, cabbage, fish, dish, pot, serving: rows / (H - 1) and columns / (W - 1) to the nearest such station by walking, and the walk's steps / (H W); 0, 0, 1 if there is none |
+    | 38 - 41 | tomatoes, onions, cabbages, fish in pots that do not cook yet / size of the largest recipe |
+    | 42      | soups on the fire or ready / R |
+    | 43, 44  | progress of the soup cooked longest; whether a soup is ready |
+    | 45 - 50 | tomatoes, onions, cabbages, fish, dishes, soups on counters / 4 |
+    | 51 + r  | recipe r is not yet delivered |
+
+    With `obs_type="rgb"` a `Box` of `uint8` and shape `(12 H, 12 W, 3)`: the picture of `render`, smaller.
+
+    ## Rewards
+
+    +20 for every delivery. A crossing of a soft virtual obstacle costs `obstacle_cost`. With `shaping=True`
+    (Overcooked-AI's values) also +3 for an ingredient put in a pot, +3 for a dish fetched while a soup waits for one
+    (taken back if it is put back: going to and fro gains nothing), +5 for a soup taken from the pot. A mapping with the
+    keys `ingredient`, `dish`, `soup` sets other values.
+
+    ## Starting State
+
+    The player stands at the layout's first start (`1` in the drawing; by default beside the serving station), facing
+    north with empty hands; pots and counters are empty.
+
+    The kitchen of an episode is, first match first: the one in `reset(options={"layout": ...})` or set by
+    `env.unwrapped.layout = ...` (from the next reset on), which stays until replaced (by None: until then as if never
+    set); one drawn from `layouts`; the one given as `layout`; a default kitchen, the same for every environment of
+    this shape.
+
+    ## Episode End
+
+    The episode terminates when every ordered soup is delivered. It is truncated after 1,200 steps (Gymnasium's
+    `max_episode_steps`).
+
+    ## Information
+
+    Every `reset` and `step` returns fresh
+
+    | Key           | Content |
+    | ------------- | ------- |
+    | `valid_goals` | `(H, W)` bool: cells the player may reach for next in the running game (candidate set `game`): stations and counters where an interaction would bring the game forward. `valid_goal_names()` names them |
+    | `action_mask` | `(6,)` int8: actions that do something (staying always), as `action_space.sample(mask)` takes it |
+    | `layout_id`   | str: twelve hexadecimal digits that identify the kitchen |
+    | `deliveries`  | int: soups delivered in this episode |
+    | `crossings`   | int: steps onto soft virtual obstacles in this episode |
+
+    ## Arguments
+
+    Args:
+        shape: Rows and columns of all kitchens of this environment, 3 to 64 each.
+        layout: The kitchen: an ASCII drawing, a list of row strings or nested lists of symbols (these keep the
+            environment's spec JSON), an `OvercookedLayout`, a 2-D array of cell codes, or a genome of
+            `OvercookedWorkspace(shape)`.
+        layouts: A distribution to draw a kitchen from at every reset: `"random"`, `"random:train"`, `"random:test"`, a
+            mapping such as `{"kind": "random", "split": "train", "num_layouts": 200}` with arguments of
+            `RandomLayouts`, a list of kitchens, or any object with `sample(rng)`.
+        recipes: The ordered soups, each a sequence of ingredients (`tomato`, `onion`, `cabbage`, `fish`), each cooked
+            and delivered once.
+        cook_time: Ticks a soup cooks.
+        obs_type: `"grid"`, `"vector"` or `"rgb"`.
+        virtual_obstacles: `"hard"`: nobody walks over them; `"soft"`: they can be crossed, and crossings are counted.
+        obstacle_cost: What a crossing costs.
+        shaping: False, True, or a mapping of rewards; see Rewards.
+        render_mode: None, `"human"` (a window), `"rgb_array"` or `"ansi"`.
+
+    Raises:
+        LayoutError: A kitchen that cannot be read, has another shape, or in which the recipes cannot be cooked; the
+            message names row, column and rule.
+        ValueError: Any other bad argument; unknown keys in the options of `reset`.
+
+    ## Version History
+
+    * v0: first version.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array", "ansi"], "render_fps": 8}
+
+    def __init__(
+        self,
+        *,
+        shape: Sequence[int] = (7, 7),
+        layout: Any = None,
+        layouts: Any = None,
+        recipes: Sequence[Sequence[str]] = PAPER_SOUPS,
+        cook_time: int = 20,
+        obs_type: str = "grid",
+        virtual_obstacles: str = "hard",
+        obstacle_cost: float = 0.0,
+        shaping: bool | Mapping[str, float] = False,
+        render_mode: str | None = None,
+    ) -> None:
+        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
+            raise ValueError(
+                f"`render_mode` must be None or one of {self.metadata['render_modes']}, got {render_mode!r}"
+            )
+        self.settings = KitchenSettings(
+            shape=shape,
+            layout=layout,
+            layouts=layouts,
+            recipes=recipes,
+            cook_time=cook_time,
+            obs_type=obs_type,
+            virtual_obstacles=virtual_obstacles,
+            obstacle_cost=obstacle_cost,
+            shaping=shaping,
+        )
+        self.render_mode = render_mode
+        self.action_space = spaces.Discrete(NUM_ACTIONS)
+        self.observation_space = self.settings.observation_space()
+        self._chosen: OvercookedLayout | None = None
+        self._pending: PackedKitchen | None = None
+        self._actions = np.zeros(1, dtype=np.int64)
+        self._goals = np.zeros(self.settings.shape, dtype=np.bool_)
+        self._flat_goals = self._goals.reshape(-1)
+        self._window: Any = None
+        self._observation_shape = self.observation_space.shape
+        self._install(self.settings.pack(self.settings.preview()))
+
+    # -- the Gymnasium interface --------------------------------------------------------------------------------------
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[npt.NDArray[Any], dict[str, Any]]:
+        """Start an episode.
+
+        Args:
+            seed: Seed of the environment's generator; None goes on with the one there is.
+            options: ``{"layout": …}`` plays in another kitchen from now on; None as its value returns to the
+                environment's own.
+
+        Returns:
+            ``(observation, info)``.
+
+        Raises:
+            LayoutError: A bad kitchen; the environment goes on as if it had not been asked.
+            ValueError: Unknown option keys.
+        """
+        super().reset(seed=seed)
+        asked = check_options(options)
+        if "layout" in asked:
+            self.layout = asked["layout"]
+        layout = self._chosen or self.settings.layout
+        if layout is None:
+            assert self.settings.distribution is not None
+            layout = self.settings.distribution.sample(self.np_random)
+        self._enter(layout)
+        mask = np.empty(NUM_ACTIONS, dtype=np.int8)
+        batch.begin(self._state, self._kitchen, self._rules, self._flat_goals, mask)
+        if self.render_mode == "human":
+            self.render()
+        return self._observe(), self._info(mask)
+
+    def step(self, action: int) -> tuple[npt.NDArray[Any], float, bool, bool, dict[str, Any]]:
+        """Advance the game by one tick.
+
+        Args:
+            action: An integer 0..5.
+
+        Returns:
+            ``(observation, reward, terminated, truncated, info)``.
+
+        Raises:
+            ValueError: The action is not an integer 0..5.
+        """
+        try:
+            self._actions[0] = action
+            valid = 0 <= self._actions[0] < NUM_ACTIONS and self._actions[0] == action
+        except (TypeError, ValueError, OverflowError):
+            valid = False
+        if not valid:
+            raise ValueError(f"expected an action 0..{NUM_ACTIONS - 1}, got {action!r}")
+        mask = np.empty(NUM_ACTIONS, dtype=np.int8)
+        reward, over = batch.play(
+            self._state, self._kitchen, self._rules, self.settings.weights, self._actions, self._flat_goals, mask
+        )
+        if self.render_mode == "human":
+            self.render()
+        return self._observe(), reward, over, False, self._info(mask)
+
+    def render(self) -> Any:
+        """Show the game: a picture ``(H', W', 3)`` uint8, a drawing in text, or a window (None).
+
+        The picture is made by :func:`~legible_envs.overcooked.rendering.draw_game`.
+        """
+        if self.render_mode is None:
+            assert self.spec is not None
+            gym.logger.warn(
+                "You are calling render method without specifying any render mode. You can specify the render_mode at "
+                f'initialization, e.g. gym.make("{self.spec.id}", render_mode="rgb_array")'
+            )
+            return None
+        if self.render_mode == "ansi":
+            return to_text(self.view())
+        from legible_envs.overcooked.rendering import draw_game
+
+        picture = draw_game(self.view())
+        if self.render_mode == "rgb_array":
+            return picture
+        if self._window is None:
+            from legible_envs.overcooked.window import Window
+
+            self._window = Window("Legible kitchen", fps=self.metadata["render_fps"])
+        self._window.show(picture)
+        return None
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._window is not None:
+            self._window.close()
+            self._window = None
+
+    # -- kitchens -----------------------------------------------------------------------------------------------------
+
+    @property
+    def layout(self) -> OvercookedLayout:
+        """The kitchen: the one set for the next reset, else the one being played in."""
+        return self._chosen or self._packed.layout
+
+    @layout.setter
+    def layout(self, value: Any) -> None:
+        if value is None:
+            self._chosen = None
+            return
+        layout = read_layout(value, self.settings.shape)
+        if layout is not self._packed.layout:
+            self._pending = self.settings.pack(layout)
+        self._chosen = layout
+
+    def _enter(self, layout: OvercookedLayout) -> None:
+        """Make a kitchen the one that is played in; staying in the same one costs nothing."""
+        if layout is self._packed.layout:
+            return
+        pending, self._pending = self._pending, None
+        self._install(pending if pending is not None and pending.layout is layout else self.settings.pack(layout))
+
+    def _install(self, packed: PackedKitchen) -> None:
+        self._packed = packed
+        self._rules, self._kitchen = packed.rules, packed.kitchen
+        self._state = np.zeros(int(packed.rules[STATE_SIZE]), dtype=np.int32)
+
+    def _observe(self) -> npt.NDArray[Any]:
+        obs_type = self.settings.obs_type
+        if obs_type == "grid":
+            grid = np.zeros(self._observation_shape, dtype=np.uint8)
+            grid_observation(self._state, self._kitchen, self._rules, grid)
+            return grid
+        if obs_type == "vector":
+            features = np.zeros(self._observation_shape, dtype=np.float32)
+            vector_observation(self._state, self._kitchen, self._rules, self._packed.routes, features)
+            return features
+        return draw_small(self.view())
+
+    def _info(self, mask: npt.NDArray[np.int8]) -> dict[str, Any]:
+        return {
+            "valid_goals": self._goals.copy(),
+            "action_mask": mask,
+            "layout_id": self._packed.layout.layout_id,
+            "deliveries": int(self._state[DELIVERIES]),
+            "crossings": int(self._state[CROSSINGS]),
+        }
+
+    # -- what people and programs ask ---------------------------------------------------------------------------------
+
+    def view(self) -> GameView:
+        """A snapshot of the game in words, for drawing."""
+        return make_view(self._packed.layout, self._state, self._rules, self.settings.rules)
+
+    def valid_goal_names(self) -> tuple[str, ...]:
+        """Names of the cells in ``info["valid_goals"]``, in reading order; counters are called ``counter@(row,col)``."""
+        layout = self._packed.layout
+        cells = [(int(row), int(col)) for row, col in np.argwhere(self._goals)]
+        return tuple(layout.station_at(cell) or f"counter@({cell[0]},{cell[1]})" for cell in cells)
+
+    @staticmethod
+    def get_keys_to_action() -> dict[tuple[int, ...], int]:
+        """Keys for ``gymnasium.utils.play`` (give it ``noop=4``): arrows or W A S D, and space or E to interact."""
+        up, down, right, left = 1073741906, 1073741905, 1073741903, 1073741904
+        keys = {up: 0, down: 1, right: 2, left: 3, ord("w"): 0, ord("s"): 1, ord("d"): 2, ord("a"): 3}
+        return {(key,): action for key, action in {**keys, ord(" "): 5, ord("e"): 5}.items()}

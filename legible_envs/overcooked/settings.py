@@ -1,0 +1,277 @@
+"""What a kitchen environment was asked to be: arguments checked once, shared by the single and the batched one."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from gymnasium import spaces
+from gymnasium.envs.registration import EnvSpec
+
+from legible_envs.errors import LayoutError
+from legible_envs.overcooked.distribution import LayoutDistribution, default_layout, read_distribution
+from legible_envs.overcooked.dynamics import POT_CELL, Kitchen, Vector
+from legible_envs.overcooked.goals import missing_station
+from legible_envs.overcooked.layout import INGREDIENTS, STATION_TYPES, OvercookedLayout
+from legible_envs.overcooked.observations import GRID_CHANNELS, NUM_FEATURES, find_routes
+from legible_envs.overcooked.recipes import PAPER_SOUPS
+from legible_envs.overcooked.rules import GameRules, pack_kitchen, pack_rules
+from legible_envs.overcooked.snapshot import RGB_TILE
+
+__all__ = [
+    "OBS_TYPES",
+    "SHAPING",
+    "JsonSpec",
+    "KitchenSettings",
+    "PackedKitchen",
+    "check_options",
+    "count_pots",
+    "read_layout",
+]
+
+OBS_TYPES: Final = ("grid", "vector", "rgb")
+SHAPING: Final[Mapping[str, float]] = {"ingredient": 3.0, "dish": 3.0, "soup": 5.0}
+"""Rewards of ``shaping=True``: an ingredient put in a pot, a dish fetched in need, a soup taken."""
+
+DELIVERY_REWARD: Final = 20.0
+
+
+def read_layout(value: Any, shape: tuple[int, int]) -> OvercookedLayout:
+    """Turn whatever describes a kitchen into one of the given shape.
+
+    Args:
+        value: An :class:`OvercookedLayout`, an ASCII drawing, a list of row strings, nested lists of symbols, a 2-D
+            array of cell codes, or a genome (1-D integers) of ``OvercookedWorkspace(shape)``.
+        shape: Rows and columns it must have.
+
+    Raises:
+        LayoutError: Not a layout, of another shape, or a genome that is invalid; names the cell where there is one.
+    """
+    if isinstance(value, OvercookedLayout):
+        layout = value
+    elif isinstance(value, str):
+        layout = OvercookedLayout.from_ascii(value)
+    elif isinstance(value, Sequence) and value and all(isinstance(row, str) for row in value):
+        layout = OvercookedLayout.from_rows(value)
+    elif isinstance(value, Sequence | np.ndarray) and len(value):
+        layout = _read_array(value, shape)
+    else:
+        raise LayoutError(
+            "expected an OvercookedLayout, an ASCII drawing, a nested list of symbols or a genome, "
+            f"got {type(value).__name__}",
+            rule="type",
+        )
+    if layout.shape != shape:
+        raise LayoutError(
+            f"this environment was made for kitchens of shape {shape}, got one of shape {layout.shape}; "
+            "make another with `shape=`",
+            rule="shape",
+        )
+    return layout
+
+
+def _read_array(value: Any, shape: tuple[int, int]) -> OvercookedLayout:
+    first = value[0]
+    if isinstance(first, Sequence) and first and isinstance(first[0], str):
+        return OvercookedLayout.from_rows(value)
+    try:
+        array = np.asarray(value)
+    except ValueError as error:
+        raise LayoutError(f"ragged nested list: {error}", rule="ragged") from error
+    if array.dtype.kind == "U" and array.ndim == 2:
+        return OvercookedLayout.from_rows(array.tolist())
+    if array.dtype.kind not in "iu" or array.ndim not in (1, 2):
+        raise LayoutError(
+            f"expected a genome (1-D integers) or cells (2-D integers or symbols), got {array.ndim}-D {array.dtype}",
+            rule="type",
+        )
+    if array.ndim == 2:
+        return OvercookedLayout(array)
+    from legible_envs.overcooked.workspace import OvercookedWorkspace
+
+    layout: OvercookedLayout = OvercookedWorkspace(shape=shape).decode(array)
+    return layout
+
+
+class PackedKitchen(NamedTuple):
+    """A kitchen as the kernels read it; see ``dynamics``, and ``observations.find_routes`` for the routes."""
+
+    layout: OvercookedLayout
+    rules: Vector
+    kitchen: Kitchen
+    routes: npt.NDArray[np.int16] | None
+
+
+class KitchenSettings:
+    """The checked arguments of :class:`~legible_envs.overcooked.env.OvercookedEnv`, which documents them."""
+
+    def __init__(
+        self,
+        *,
+        shape: Sequence[int] = (7, 7),
+        layout: Any = None,
+        layouts: Any = None,
+        recipes: Sequence[Sequence[str]] = PAPER_SOUPS,
+        cook_time: int = 20,
+        obs_type: str = "grid",
+        virtual_obstacles: str = "hard",
+        obstacle_cost: float = 0.0,
+        shaping: bool | Mapping[str, float] = False,
+    ) -> None:
+        self.shape = _read_shape(shape)
+        if obs_type not in OBS_TYPES:
+            raise ValueError(f"`obs_type` must be one of {OBS_TYPES}, got {obs_type!r}")
+        if virtual_obstacles not in ("hard", "soft"):
+            raise ValueError(f"`virtual_obstacles` must be 'hard' or 'soft', got {virtual_obstacles!r}")
+        if not np.isfinite(obstacle_cost) or obstacle_cost < 0:
+            raise ValueError(f"`obstacle_cost` must be a finite number >= 0, got {obstacle_cost!r}")
+        if layout is not None and layouts is not None:
+            raise ValueError("give either `layout` (one kitchen) or `layouts` (a distribution), not both")
+        self.obs_type = obs_type
+        self.rules = GameRules(
+            recipes=tuple(tuple(recipe) if not isinstance(recipe, str) else recipe for recipe in recipes),  # type: ignore[misc]
+            cook_time=cook_time,
+            soft_obstacles=virtual_obstacles == "soft",
+        )
+        bonus = _read_shaping(shaping)
+        self.weights = np.array([DELIVERY_REWARD, bonus["ingredient"], bonus["dish"], bonus["soup"], -obstacle_cost])
+        self.distribution: LayoutDistribution | None = None
+        self.layout: OvercookedLayout | None = None
+        if layouts is not None:
+            self.distribution = read_distribution(layouts, self.shape)
+        else:
+            self.layout = default_layout(self.shape) if layout is None else read_layout(layout, self.shape)
+
+    def preview(self) -> OvercookedLayout:
+        """The kitchen before the first reset: the only one, or an example of the distribution."""
+        if self.distribution is None:
+            assert self.layout is not None
+            return self.layout
+        return self.distribution.sample(np.random.default_rng(0))
+
+    def pack(self, layout: OvercookedLayout, num_pots: int | None = None) -> PackedKitchen:
+        """The arrays that the kernels read.
+
+        Args:
+            layout: A kitchen of the right shape.
+            num_pots: Room for this many pots; None means as many as there are.
+
+        Raises:
+            LayoutError: The recipes cannot be cooked in this kitchen.
+        """
+        pots = count_pots(layout) if num_pots is None else num_pots
+        rules = pack_rules(self.rules, self.shape, 1, pots)
+        kitchen = pack_kitchen(layout, rules)
+        self._check_playable(layout, kitchen, rules)
+        if self.obs_type != "vector":
+            return PackedKitchen(layout, rules, kitchen, None)
+        routes = np.empty((7, 2, self.shape[0] * self.shape[1]), dtype=np.int16)
+        find_routes(kitchen, rules, routes)
+        return PackedKitchen(layout, rules, kitchen, routes)
+
+    @staticmethod
+    def _check_playable(layout: OvercookedLayout, kitchen: Kitchen, rules: Vector) -> None:
+        """Raise an error if the recipes cannot be cooked in this kitchen.
+
+        Raises:
+            LayoutError: A station that the recipes need is absent or cannot be reached from the player's start.
+        """
+        code = missing_station(kitchen, rules, 0)
+        if not code:
+            return
+        kind = STATION_TYPES[code - 3]
+        names = layout.named(kind)
+        if not names:
+            raise LayoutError(f"the kitchen has no {kind} station, which the recipes need", rule="station")
+        row, col = layout.stations[names[0]]
+        start = layout.starts[0]
+        raise LayoutError(
+            f"row {row}, column {col}: the {kind} station cannot be reached from the player's start at row {start[0]}, "
+            f"column {start[1]}",
+            rule="reachable",
+            cell=(row, col),
+        )
+
+    def observation_space(self) -> spaces.Box:
+        """The space of one environment's observations."""
+        height, width = self.shape
+        orders = len(self.rules.recipes)
+        if self.obs_type == "vector":
+            return spaces.Box(-1.0, 1.0, (NUM_FEATURES + orders,), np.float32)
+        if self.obs_type == "rgb":
+            return spaces.Box(0, 255, (height * RGB_TILE, width * RGB_TILE, 3), np.uint8)
+        high = np.ones((height, width, len(GRID_CHANNELS) + orders), dtype=np.uint8)
+        for number, kind in enumerate(INGREDIENTS):
+            most = max(recipe.count(kind) for recipe in self.rules.recipes)
+            high[..., GRID_CHANNELS.index("tomatoes") + number] = max(most, 1)
+        high[..., GRID_CHANNELS.index("ticks cooked")] = min(self.rules.cook_time, 255)
+        return spaces.Box(np.zeros_like(high), high, dtype=np.uint8)
+
+
+def _read_shape(shape: Sequence[int]) -> tuple[int, int]:
+    sides = tuple(int(side) for side in shape)
+    if len(sides) != 2 or min(sides) < 3 or max(sides) > 64:
+        raise ValueError(f"`shape` must be two numbers (rows, columns) of 3 to 64, got {shape!r}")
+    return sides[0], sides[1]
+
+
+def _read_shaping(shaping: bool | Mapping[str, float]) -> Mapping[str, float]:
+    if isinstance(shaping, Mapping):
+        unknown = sorted(set(shaping) - set(SHAPING))
+        if unknown:
+            raise ValueError(f"unknown shaping rewards {unknown}; known: {list(SHAPING)}")
+        return {key: float(shaping.get(key, 0.0)) for key in SHAPING}
+    return SHAPING if shaping else dict.fromkeys(SHAPING, 0.0)
+
+
+def check_options(options: Mapping[str, Any] | None, known: Sequence[str] = ("layout",)) -> Mapping[str, Any]:
+    """The options of a reset.
+
+    Raises:
+        ValueError: Unknown keys.
+    """
+    if not options:
+        return {}
+    unknown = sorted(str(key) for key in options if key not in known)
+    if unknown:
+        raise ValueError(f"unknown reset options {unknown}; known: {list(known)}")
+    return options
+
+
+def count_pots(layout: OvercookedLayout) -> int:
+    """Number of pots in a kitchen."""
+    return int(np.count_nonzero(layout.cells == POT_CELL))
+
+
+class JsonSpec:
+    """Keeps an environment's spec JSON: layouts and distributions given as objects are recorded as plain data."""
+
+    _spec: EnvSpec | None = None
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """How the environment was made, as ``gymnasium.make`` can repeat it."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, value: EnvSpec | None) -> None:
+        if value is not None:
+            value = copy.copy(value)
+            value.kwargs = {key: _plain(argument) for key, argument in value.kwargs.items()}
+        self._spec = value
+
+
+def _plain(value: Any) -> Any:
+    """Plain data that means the same to the environment."""
+    if isinstance(value, OvercookedLayout):
+        return value.to_ascii()
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, Mapping):
+        return {key: _plain(entry) for key, entry in value.items()}
+    if isinstance(value, tuple | list):
+        return [_plain(entry) for entry in value]
+    return value.to_config() if hasattr(value, "to_config") else value
