@@ -258,7 +258,8 @@ def _lede(data: dict[str, Any]) -> str:
     """What was found, in two sentences."""
     best, conditions = data["best"], {c["name"]: c for c in data["conditions"]}
     text = f"The best kitchen found scores {_number(best.get('score'))} in legibility"
-    if best.get("normalised") is not None:
+    bounded = data["config"]["workspace"].get("prefix") != "sum"
+    if bounded and (best.get("normalised") or -1) > 0:
         text += f", {_number(100 * best['normalised'], 0)} % of the highest conceivable score"
     text += f", and its task takes {_number(best.get('distance'), 1)} steps on average."
     if "random" in conditions:
@@ -273,13 +274,13 @@ def _lede(data: dict[str, Any]) -> str:
 def _figures(data: dict[str, Any]) -> list[tuple[str, str, str]]:
     """Key figures under the title: name, value, remark."""
     best, result, config = data["best"], data["result"], data["config"]
-    share = best.get("single_goal_share")
     filled, cells = data["archive_size"], math.prod(data["archive_dims"])
     evaluations = result.get("evaluations") or (data["history"].get("evaluations") or [None])[-1]
-    single = "" if share is None else f"{_number(100 * share, 0)} % from single-goal reaches"
+    single = best.get("single_goal_score")
+    bounded = config["workspace"].get("prefix") != "sum"
     return [
-        ("Legibility", _number(best.get("score")), single),
-        ("Normalised", _number(best.get("normalised")), "of at most 1"),
+        ("Legibility", _number(best.get("score")), f"{_number(single)} of it from single-goal reaches"),
+        ("Normalised", _number(best.get("normalised")), "of at most 1" if bounded else "per reach"),
         ("Distance", _number(best.get("distance"), 1), "expected steps of one task"),
         ("Evaluations", _number(evaluations, 0), f"seed {config.get('seed')}"),
         (
@@ -296,11 +297,11 @@ def _settings(config: Mapping[str, Any]) -> list[tuple[str, list[tuple[str, str]
     def flat(value: Any, prefix: str = "") -> list[tuple[str, str]]:
         if isinstance(value, Mapping):
             return [row for key, item in value.items() for row in flat(item, f"{prefix}{key} ")]
-        text = "none" if value is None else json.dumps(value) if isinstance(value, list | bool) else str(value)
-        return [(prefix.strip().replace("_", " "), text if len(text) <= 240 else text[:239] + "…")]
+        text = _words(value)
+        return [(prefix.strip().replace("_", " "), text if len(text) <= 240 else text[:239] + "…")] if text else []
 
     searched = {key: config.get(key) for key in ("objective", "emitter", "seed", "evaluations", "calibration")}
-    archive = {key: value for key, value in config["archive"].items() if key != "ranges"}
+    archive = {key: config["archive"].get(key) for key in ("dims", "measure_names")}
     made = {key: config.get(key) for key in ("created", "git_revision", "platform")}
     groups = [
         ("Search", {**searched, "archive": archive}),
@@ -308,6 +309,15 @@ def _settings(config: Mapping[str, Any]) -> list[tuple[str, list[tuple[str, str]
         ("Versions", {**made, **(config.get("versions") or {})}),
     ]
     return [(title, flat(group)) for title, group in groups]
+
+
+def _words(value: Any) -> str:
+    """A setting for reading; empty where nothing was set."""
+    if isinstance(value, list):
+        return ("; " if any(isinstance(item, list) for item in value) else ", ").join(_words(item) for item in value)
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return "" if value is None else str(value)
 
 
 def _date(text: Any) -> str:

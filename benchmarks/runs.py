@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Run", "RunError", "is_run_folder", "read_run"]
+__all__ = ["Run", "RunError", "is_run_folder", "read_config", "read_run"]
 
 
 class RunError(ValueError):
@@ -78,7 +78,7 @@ def read_run(folder: str | Path) -> Run:
     folder = Path(folder)
     if not folder.is_dir():
         raise RunError(f"{folder} is not a folder; expected the --out folder of `legible optimize`")
-    config = _read_config(folder / "config.json")
+    config = read_config(folder / "config.json")
     arrays = _read_archive(folder / "archive.npz")
     best_first = np.argsort(-arrays["objective"], kind="stable")
     return Run(
@@ -92,7 +92,12 @@ def read_run(folder: str | Path) -> Run:
     )
 
 
-def _read_config(path: Path) -> dict[str, Any]:
+def read_config(path: Path) -> dict[str, Any]:
+    """The manifest of a run.
+
+    Raises:
+        RunError: There is none, or it is damaged.
+    """
     try:
         config = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError as error:

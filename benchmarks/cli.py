@@ -1,0 +1,235 @@
+"""The command ``legible``: every command of the project, thin over the libraries, with errors of one line."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import click
+
+from legible_envs import __version__
+
+__all__ = ["main"]
+
+
+class _Commands(click.Group):
+    """A group whose commands answer bad input with one line and exit code 2 instead of a traceback."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        with _one_line_errors(bool(ctx.params.get("traceback"))):
+            return super().invoke(ctx)
+
+
+class _BadInput(click.ClickException):
+    exit_code = 2
+
+
+@contextlib.contextmanager
+def _one_line_errors(show_traceback: bool) -> Iterator[None]:
+    """Turn the errors that the libraries raise about input, files and settings into clicks of exit code 2."""
+    try:
+        yield
+    except (click.ClickException, click.exceptions.Exit, click.Abort, BrokenPipeError):
+        raise
+    except (ValueError, OSError, RuntimeError, ImportError) as error:
+        if show_traceback:
+            raise
+        raise _BadInput(_message(error)) from error
+
+
+def _message(error: Exception) -> str:
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.strerror}: {error.filename}" if error.filename else error.strerror
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(__version__, prog_name="legible")
+@click.option("--traceback", is_flag=True, help="Show where in the program an error arose.")
+def main(traceback: bool) -> None:
+    """Design workspaces in which people's motion can be read.
+
+    LAYOUT is a file with an ASCII drawing, - for standard input, an Overcooked-AI .layout file, or the folder of a
+    search.
+    """
+
+
+_out = click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Folder to write to.")
+_layout = click.argument("layout", metavar="LAYOUT")
+_pots = click.option("--pots", type=click.IntRange(min=1), help="Soups in progress at once. [default: no limit]")
+
+
+class _Prefix(click.ParamType[Any]):
+    """``mean``, ``sum``, or fractions such as ``0.25,0.5``."""
+
+    name = "mean|sum|fractions"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if value in ("mean", "sum") or isinstance(value, tuple):
+            return value
+        try:
+            return tuple(float(part) for part in str(value).split(","))
+        except ValueError:
+            self.fail(f"{value!r} is neither 'mean', 'sum' nor fractions such as 0.25,0.5", param, ctx)
+
+
+# -- search ------------------------------------------------------------------------------------------------------------
+
+
+@main.command()
+@click.argument("domain", type=click.Choice(["overcooked"]))
+@click.option("--shape", nargs=2, type=click.IntRange(min=4), default=(7, 7), show_default=True, metavar="ROWS COLS")
+@click.option(
+    "--objective",
+    type=click.Choice(["legibility", "efficiency", "legible-efficient"]),
+    default="legibility",
+    show_default=True,
+)
+@click.option("--prefix", type=_Prefix(), default="mean", show_default=True, help="Which prefixes of a walk count.")
+@_pots
+@click.option("--emitter", default="improve", show_default=True, metavar="NAME|MODULE:CLASS")
+@click.option("--evaluations", type=click.IntRange(min=1), default=200_000, show_default=True)
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@click.option("--max-distance", type=float, help="Refuse layouts whose task takes longer than this.")
+@click.option("--resume", is_flag=True, help="Continue the search in the --out folder, with its own settings.")
+@click.option("--overwrite", is_flag=True, help="Replace a search that lies in the --out folder.")
+@click.option("--quiet", is_flag=True, help="Show no progress bar.")
+@_out
+@click.pass_context
+def optimize(ctx: click.Context, domain: str, out: Path | None, **settings: Any) -> None:
+    """Search for layouts; write the archive, curves, pictures and a report."""
+    from benchmarks.searching import default_folder, resumed_settings, run_search
+
+    given = {name for name in settings if ctx.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT}
+    folder = out or default_folder(domain, settings)
+    if settings["resume"]:
+        settings = resumed_settings(folder, settings, given)
+    run_search(domain, folder, **settings)
+
+
+@main.command()
+@click.argument("run", type=click.Path(exists=True, file_okay=False, path_type=Path))
+def report(run: Path) -> None:
+    """Write report.html and best.png anew from the files of a search, finished or not."""
+    from benchmarks.report import write_best_image, write_report
+
+    write_best_image(run)
+    click.echo(f"report: {write_report(run)}")
+
+
+@main.command()
+def emitters() -> None:
+    """List the emitters that are plugged in."""
+    from benchmarks.console import say, table
+    from benchmarks.searching import emitter_rows
+
+    say().print(table(emitter_rows()))
+
+
+# -- single kitchens ---------------------------------------------------------------------------------------------------
+
+
+@main.command()
+@_layout
+@click.option("--prefix", type=_Prefix(), help="Which prefixes of a walk count. [default: mean, or the run's own]")
+@_pots
+@click.option("--trajectories", type=click.Path(exists=True, dir_okay=False, path_type=Path),
+              help="Recorded walks: also say how well predictors read them in this kitchen.")  # fmt: skip
+def score(layout: str, prefix: Any, pots: int | None, trajectories: Path | None) -> None:
+    """Score one kitchen exactly: legibility, distance, and what belongs beside them."""
+    from benchmarks.inspecting import score_lines, trajectory_table
+    from benchmarks.kitchens import load_kitchen
+
+    kitchen = load_kitchen(layout, prefix=prefix, pots=pots)
+    for line in score_lines(kitchen):
+        click.echo(line)
+    if trajectories is not None:
+        from benchmarks.console import say
+
+        say().print(trajectory_table(kitchen, trajectories))
+
+
+@main.command()
+@_layout
+@click.option("--prefix", type=_Prefix(), help="Which prefixes of a walk count. [default: mean, or the run's own]")
+@_pots
+@click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="Where to write the picture (.png).")
+def show(layout: str, prefix: Any, pots: int | None, out: Path | None) -> None:
+    """Draw a kitchen and explain its score: which reaches win and lose it, and where goals are confused."""
+    from benchmarks.console import say
+    from benchmarks.inspecting import show_kitchen
+    from benchmarks.kitchens import load_kitchen
+
+    show_kitchen(say(), load_kitchen(layout, prefix=prefix, pots=pots), out)
+
+
+@main.command()
+@_layout
+def play(layout: str) -> None:
+    """Cook in a kitchen yourself: arrow keys to walk, space to interact."""
+    from benchmarks.kitchens import load_kitchen
+    from legible_envs.overcooked.play import play as play_layout
+
+    play_layout(load_kitchen(layout).layout)
+
+
+# -- recorded people, demonstration, speed -----------------------------------------------------------------------------
+
+
+@main.group(cls=_Commands)
+def humans() -> None:
+    """Real recorded play: fetch it, convert it, count it."""
+
+
+@humans.command()
+@click.option("--from", "source", type=click.Path(exists=True, dir_okay=False, path_type=Path),
+              help="A copy of the source distribution, instead of the package index.")  # fmt: skip
+@_out
+def fetch(source: Path | None, out: Path | None) -> None:
+    """Fetch the published games once and convert them; nothing in the download is executed."""
+    from legible_envs.overcooked.recordings import fetch_recordings
+
+    click.echo(f"recordings: {fetch_recordings(source=source, out=out)}")
+
+
+@humans.command()
+@click.option("--from", "folder", type=click.Path(exists=True, file_okay=False, path_type=Path),
+              help="The folder `legible humans fetch --out` wrote.")  # fmt: skip
+def stats(folder: Path | None) -> None:
+    """Count games, people, transitions and walks."""
+    from benchmarks.console import say, table
+    from legible_envs.overcooked.recordings import recording_stats
+
+    say().print(table(recording_stats(folder)))
+
+
+@main.command()
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("runs/demo"), show_default=True)
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@click.option("--offline", is_flag=True, help="Do not fetch recorded play.")
+def demo(out: Path, seed: int, offline: bool) -> None:
+    """Search a legible kitchen, compare it with others, and read recorded people; under a minute."""
+    from benchmarks.console import say
+    from benchmarks.demo import run_demo
+
+    run_demo(out, seed=seed, offline=offline, console=say())
+
+
+@main.command()
+@click.option("--quick", is_flag=True, help="A tenth of the repeats: rough figures in a minute.")
+@click.option("--peers", is_flag=True, help="Measure Overcooked-AI beside it, in a virtual environment of its own.")
+@click.option("--peers-dir", type=click.Path(path_type=Path, file_okay=False), help="Where that environment lives.")
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the table as Markdown.")
+def bench(quick: bool, peers: bool, peers_dir: Path | None, out: Path | None) -> None:
+    """Measure speed, as ratios within one run."""
+    from benchmarks.console import say
+    from benchmarks.throughput.run import run_benchmark
+
+    run_benchmark(say(), quick=quick, peers=peers, peers_folder=peers_dir, out=out)
+
+
+if __name__ == "__main__":
+    main(prog_name=os.environ.get("LEGIBLE_PROG", "legible"))

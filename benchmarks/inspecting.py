@@ -1,0 +1,113 @@
+"""What ``legible score`` and ``legible show`` say about one kitchen."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from benchmarks.console import board_for, number, table
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+    from benchmarks.kitchens import Kitchen
+
+__all__ = ["score_lines", "show_kitchen", "trajectory_table"]
+
+WORST_ROWS = 10
+"""Rows of the table of losses that the terminal shows."""
+
+
+def score_lines(kitchen: Kitchen) -> list[str]:
+    """The score of a kitchen as lines of ``name value``, for people and for ``grep``."""
+    summary = kitchen.summary()
+    lines = [
+        f"legibility      {number(summary['score'], 4)}",
+        f"distance        {number(summary['distance'], 4)}",
+        f"normalised      {number(summary['normalised'], 4)}",
+        f"single-goal     {_single_goal(summary)}",
+        f"obstacles       {summary['num_obstacles']}",
+        f"task            {'; '.join(' + '.join(soup) for soup in kitchen.soups)}",
+        f"candidate set   {summary['candidate_set']}",
+        f"sequences       {summary['num_sequences']:,}",
+        f"layout id       {summary['layout_id']}",
+    ]
+    if kitchen.broken_rule:
+        lines.append(f"design rules    outside: {kitchen.broken_rule}")
+    return lines
+
+
+def _single_goal(summary: Mapping[str, Any]) -> str:
+    """Part of the score from reaches that cannot be misread; a share only where it means something."""
+    part, share = summary["single_goal_score"], summary["single_goal_share"]
+    return number(part, 4) + (f" ({share:.1%} of the score)" if 0 <= share <= 1 else "")
+
+
+def show_kitchen(console: Console, kitchen: Kitchen, picture: Path | None) -> None:
+    """Print a kitchen, its score and its losses; write where goals are confused as a picture if asked to."""
+    from rich.columns import Columns
+
+    lines = "\n".join(score_lines(kitchen))
+    console.print(Columns([board_for(console, kitchen.layout), lines], padding=(1, 4)))
+    rows = kitchen.explain()
+    shown = rows[:WORST_ROWS]
+    console.print()
+    console.print(
+        table([_loss_row(row) for row in shown], title="Reaches that lose most (contributions sum to the score)")
+    )
+    if len(rows) > len(shown):
+        rest = math.fsum(row["contribution"] for row in rows[len(shown) :])
+        console.print(f"… and {len(rows) - len(shown)} more reaches, together {number(rest)}", style="dim")
+    console.print()
+    console.print(table([_loss_row(row) for row in rows[-3:][::-1]], title="Reaches that win most"))
+    if picture is None:
+        console.print("where goals are confused, as a picture: add --out FILE.png", style="dim")
+    else:
+        write_ambiguity(kitchen, picture)
+        console.print(f"where goals are confused: {picture}")
+
+
+def _loss_row(row: Mapping[str, Any]) -> dict[str, Any]:
+    ties = sorted(row["ties_with"].items(), key=lambda item: -item[1])
+    return {
+        "from": row["start"],
+        "to": row["goal"],
+        "among": len(row["goals"]),
+        "times": row["weight"],
+        "score": row["score"],
+        "contribution": row["contribution"],
+        "confused with (share of the way)": ", ".join(f"{name} {share:.0%}" for name, share in ties if share > 0)
+        or "-",
+    }
+
+
+def write_ambiguity(kitchen: Kitchen, path: Path) -> None:
+    """Draw the kitchen with, on each cell, how often an observer would name a wrong goal."""
+    from legible_envs.overcooked.rendering import draw_ambiguity, save_png
+
+    heat = kitchen.ambiguity()
+    save_png(path, draw_ambiguity(kitchen.layout, heat, tile=72, title="Where goals are confused"))
+
+
+def trajectory_table(kitchen: Kitchen, trajectories: Path) -> Table:
+    """How well the heuristic and Eq. 1 read recorded walks in this kitchen, by share observed.
+
+    Raises:
+        ValueError: The file holds no walks, or none of this kitchen.
+    """
+    from legible_envs.rollouts import load_trajectories
+    from predictors import BayesianGoalPredictor, ShortestDistance
+
+    walks = [walk for walk in load_trajectories(trajectories) if walk.layout == kitchen.layout]
+    if not walks:
+        raise ValueError(f"{trajectories} has no walk recorded in this kitchen (layout id {kitchen.layout.layout_id})")
+    fractions = (0.1, 0.3, 0.5, 0.7, 0.9)
+    rows = []
+    for name, predictor in (("shortest distance", ShortestDistance()), ("Eq. 1", BayesianGoalPredictor())):
+        predictor.fit(walks)
+        scores = [predictor.score(walks, fraction=fraction) for fraction in fractions]
+        rows.append({"predictor": name, **{f"{f:.0%}": s for f, s in zip(fractions, scores, strict=True)}})
+    return table(rows, title=f"{len(walks):,} walks: goals read correctly, by share of the walk observed")
