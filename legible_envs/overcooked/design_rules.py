@@ -179,7 +179,7 @@ class DesignRules:
                     raise LayoutError(f"{other} and {name} both at {where}", rule="distinct", cell=cell)
                 if abs(r - cell[0]) + abs(c - cell[1]) < 2:
                     raise LayoutError(
-                        f"{other} at row {r}, column {c} and {name} at {where} touch; stations must be at least 2 apart",
+                        f"{other} at row {r}, column {c} and {name} at {where} touch; they must be at least 2 apart",
                         rule="spacing",
                         cell=cell,
                     )

@@ -17,6 +17,7 @@ from legible_envs.overcooked.legibility import BLOCKED, FREE, ScoreTables, make_
 __all__ = ["Geometry", "perturb_genomes", "sample_genomes", "score_genomes", "valid_genomes"]
 
 MAX_TRIES = 1000
+TRIES_PER_KIND = 50
 
 
 class Geometry(NamedTuple):
@@ -101,7 +102,7 @@ def connected(
                 height += 1
     for cell in access:
         if not seen[cell]:
-            return False
+            return False  # a loop, because the kernel compiler takes no generator expressions
     return True
 
 
@@ -193,16 +194,21 @@ def sample_genomes(
 
 
 @kernel
-def change(genome: Genomes, geometry: Geometry, rng: np.random.Generator) -> int:
+def change(genome: Genomes, kind: int, geometry: Geometry, rng: np.random.Generator) -> int:
     """Try one random small change in place.
+
+    Args:
+        genome: ``[d]`` a valid genome.
+        kind: 0 move a station to a free counter, 1 swap two stations, 2 add an obstacle, 3 remove one.
+        geometry: Where things may stand.
+        rng: Source of randomness.
 
     Returns:
         0: nothing was changed (the draw did not apply). 1: changed, and still connected if it was. 2: changed, and
         connections have to be checked.
     """
     num_stations, num_slots = geometry.allowed.shape
-    kind = rng.integers(0, 4)
-    if kind == 0:  # move a station to a free counter
+    if kind == 0:
         i = rng.integers(0, num_stations)
         slot = rng.integers(0, num_slots)
         if slot == genome[i] or not geometry.allowed[i, slot]:
@@ -212,19 +218,19 @@ def change(genome: Genomes, geometry: Geometry, rng: np.random.Generator) -> int
                 return 0
         genome[i] = slot
         return 2
-    if kind == 1:  # swap two stations
+    if kind == 1:
         i = rng.integers(0, num_stations)
-        j = rng.integers(0, num_stations)
-        if i == j or not (geometry.allowed[i, genome[j]] and geometry.allowed[j, genome[i]]):
+        other = rng.integers(0, num_stations)
+        if i == other or not (geometry.allowed[i, genome[other]] and geometry.allowed[other, genome[i]]):
             return 0
-        genome[i], genome[j] = genome[j], genome[i]
+        genome[i], genome[other] = genome[other], genome[i]
         return 1
     i = rng.integers(0, len(geometry.inner))
     bit = num_stations + i
-    if kind == 2 and genome[bit] == 0 and geometry.may_block[i]:  # add an obstacle
+    if kind == 2 and genome[bit] == 0 and geometry.may_block[i]:
         genome[bit] = 1
         return 2
-    if kind == 3 and genome[bit] == 1:  # remove an obstacle
+    if kind == 3 and genome[bit] == 1:
         genome[bit] = 0
         return 1
     return 0
@@ -234,9 +240,9 @@ def change(genome: Genomes, geometry: Geometry, rng: np.random.Generator) -> int
 def perturb_genomes(parents: Genomes, k: int, geometry: Geometry, rng: np.random.Generator, children: Genomes) -> None:
     """Write ``k`` valid children of each of ``parents [B, d]`` to ``children [B * k, d]``, grouped by parent.
 
-    Each child differs by one change: a station moved to a free counter, two stations swapped, an obstacle added or
-    removed, drawn with equal probability among those that apply and keep the kitchen valid. A parent of which no valid
-    child is found repeats itself.
+    Each child differs by one change: a station moved to a free counter, two stations swapped, an obstacle added, or
+    one removed. The kind is drawn first, all equally likely, then its place until the kitchen is valid; a kind that
+    finds no place in 50 draws is drawn anew. A parent of which no valid child is found repeats itself.
     """
     num_stations = len(geometry.allowed)
     floor = np.full(geometry.num_cells, BLOCKED, dtype=np.int32)
@@ -246,9 +252,12 @@ def perturb_genomes(parents: Genomes, k: int, geometry: Geometry, rng: np.random
     for b in range(len(parents)):
         for n in range(b * k, (b + 1) * k):
             child = children[n]
-            for _ in range(MAX_TRIES):
+            kind = 0
+            for attempt in range(MAX_TRIES):
+                if attempt % TRIES_PER_KIND == 0:
+                    kind = int(rng.integers(0, 4))
                 child[:] = parents[b]
-                outcome = change(child, geometry, rng)
+                outcome = change(child, kind, geometry, rng)
                 if outcome == 0:
                     continue
                 if outcome == 1:

@@ -192,7 +192,7 @@ def score_cells(
     for s in range(len(tables.starts)):
         start = tables.starts[s]
         weights = tables.stage_weights[s]
-        # All stations are connected, so every flood reaches the same cells; which one left them in the queue is all one.
+        # All stations are connected, so any flood's queue holds the cells that every flood reaches.
         for cell in queue[:reached]:
             here = distance[start, cell]
             tied, num_free, on_path = 0, 0, 0

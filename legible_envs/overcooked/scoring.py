@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -250,7 +250,8 @@ def ambiguity(
     for _, goals, goal, weight, scores in _reaches(layout, task or soup_task(), cell_costs, settings):
         for s in scores:
             # A walk on an optimal path always has its goal among the tied ones.
-            visits[s.node] += weight / len(goals) * s.probability
-            wrong[s.node] += weight / len(goals) * s.probability * (1 - (goal in s.tied) / len(s.tied))
+            cell = cast("tuple[int, int]", s.node)
+            visits[cell] += weight / len(goals) * s.probability
+            wrong[cell] += weight / len(goals) * s.probability * (1 - (goal in s.tied) / len(s.tied))
     with np.errstate(invalid="ignore"):
         return np.where(visits > 0, wrong / visits, np.nan)

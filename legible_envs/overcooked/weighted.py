@@ -177,7 +177,7 @@ def score_genomes_weighted(
     strict: bool,
     legibility: Floats,
 ) -> None:
-    """Score ``genomes [B, d]`` into ``legibility [B]`` where stepping on cell ``i`` costs ``costs[i]``; NaN if invalid."""
+    """Score ``genomes [B, d]`` into ``legibility [B]`` with ``costs [n]`` to step on each cell; NaN if invalid."""
     floor = np.full(geometry.num_cells, BLOCKED, dtype=np.int32)
     access = np.empty(len(geometry.allowed), dtype=np.int64)
     seen = np.empty(geometry.num_cells, dtype=np.bool_)

@@ -49,8 +49,8 @@ class OvercookedWorkspace(Workspace):
         human: How people walk: ``"shortest"``, uniformly over all shortest paths.
         recipes: Soups of the default task.
         pots: How many soups may be in progress at once; None means precedence only, as in the paper's appendix.
-        task: A :class:`~legible_envs.tasks.TaskGraph` over station types (or its ``to_dict()``), in place of recipes and
-            pots.
+        task: A :class:`~legible_envs.tasks.TaskGraph` over station types (or its ``to_dict()``), in place of
+            recipes and pots.
         ranked: Stations whose reading order is the second measure (default: the ingredients), or ``"all"``.
         stations: Station types of the kitchen.
         locked: Stations that stay: ``{type: (row, col)}``, or type names whose cells ``start_from`` gives.
@@ -205,9 +205,9 @@ class OvercookedWorkspace(Workspace):
         if not 0 <= obstacle_rate <= 1:
             raise ValueError(f"obstacle_rate must be in [0, 1], got {obstacle_rate!r}")
         genomes = np.zeros((n, self.genome_size), dtype=np.int8)
-        first = 0 if self._home is None or n == 0 else 1
-        if first:
-            genomes[0] = self._home
+        first = 0
+        if self._home is not None and n:
+            genomes[0], first = self._home, 1
         found = kernels.sample_genomes(genomes[first:], self.rules.geometry, obstacle_rate, MAX_SAMPLE_TRIES, rng)
         if found < n - first:
             raise LayoutError(
@@ -290,7 +290,7 @@ class OvercookedWorkspace(Workspace):
 
     @cached_property
     def _reading_position(self) -> npt.NDArray[np.int64]:
-        return np.array([r * self.shape[1] + c for r, c in self.rules.slots])
+        return np.array([r * self.shape[1] + c for r, c in self.rules.slots], dtype=np.int64)
 
     @property
     def order_names(self) -> tuple[str, ...]:
@@ -317,7 +317,7 @@ class OvercookedWorkspace(Workspace):
 
     def penalty(self, genomes: npt.NDArray[Any]) -> Array:
         """``(n,)`` relocation cost; virtual obstacles are light and cost nothing to move."""
-        return self.relocation_cost * self.relocations(genomes)
+        return np.asarray(self.relocation_cost * self.relocations(genomes), dtype=np.float64)
 
     # -- one layout ------------------------------------------------------------------------------------------------
 
