@@ -112,10 +112,13 @@ def report_data(
         "archive_dims": [rows, columns],
         "history": _history(run),
         "conditions": [_condition(c) for c in conditions or ()],
-        "recorded_play": _plain(dict(recorded_play)) if recorded_play else None,
+        "recorded_play": _plain({**_NO_PLAY, **recorded_play}) if recorded_play else None,
         "config": {key: value for key, value in config.items() if key != "result"},
         "result": {key: _plain(value) for key, value in (config.get("result") or {}).items() if key != "best_genome"},
     }
+
+
+_NO_PLAY: dict[str, Any] = {"note": "", "fractions": [], "curves": [], "table": None}
 
 
 # -- the parts of the data ---------------------------------------------------------------------------------------------
@@ -128,17 +131,21 @@ def _best(run: Run) -> dict[str, Any]:
 
 
 def _axes(run: Run, rows: int, columns: int) -> list[dict[str, Any]]:
-    """Names and labels of both axes; ``step`` is how many archive cells share one drawn cell."""
-    names = list(config_names) if (config_names := run.config["archive"].get("measure_names")) else ["", ""]
+    """Names and labels of both axes; ``step`` is how many archive cells share one drawn cell.
+
+    Rows above the last one with a layout in it are left out: rooms allow far fewer obstacles than they have cells.
+    """
+    names = run.config["archive"].get("measure_names") or ["first measure", "second measure"]
+    filled = min(rows, int(run.index.max()) // columns + 2) if len(run.index) else rows
     order_names = list(getattr(run.workspace, "order_names", ()))
     axes = []
-    for name, count, most, labels in (
-        (names[0], rows, MAX_ROWS, None),
-        (names[1], columns, MAX_COLUMNS, order_names if len(order_names) == columns else None),
+    for name, count, whole, most, labels in (
+        (names[0], filled, rows, MAX_ROWS, None),
+        (names[1], columns, columns, MAX_COLUMNS, order_names if len(order_names) == columns else None),
     ):
-        step = math.ceil(count / most)
+        step = math.ceil(whole / most)
         shown = [str(labels[i] if labels else i) for i in range(0, count, step)]
-        axes.append({"name": str(name), "count": len(shown), "step": step, "labels": shown})
+        axes.append({"name": str(name), "count": len(shown), "step": step, "labels": shown, "whole": whole})
     return axes
 
 
@@ -303,6 +310,9 @@ def _settings(config: Mapping[str, Any]) -> list[tuple[str, list[tuple[str, str]
     searched = {key: config.get(key) for key in ("objective", "emitter", "seed", "evaluations", "calibration")}
     archive = {key: config["archive"].get(key) for key in ("dims", "measure_names")}
     made = {key: config.get(key) for key in ("created", "git_revision", "platform")}
+    if made["git_revision"]:
+        revision, *dirty = str(made["git_revision"]).split("-")
+        made["git_revision"] = "-".join([revision[:12], *dirty])
     groups = [
         ("Search", {**searched, "archive": archive}),
         ("Workspace", config["workspace"]),
@@ -317,6 +327,8 @@ def _words(value: Any) -> str:
         return ("; " if any(isinstance(item, list) for item in value) else ", ").join(_words(item) for item in value)
     if isinstance(value, bool):
         return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.6g}"
     return "" if value is None else str(value)
 
 

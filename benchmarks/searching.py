@@ -71,8 +71,10 @@ def run_search(
     from optimizers import SearchInterrupted, search
 
     if is_run_folder(out) and not (resume or overwrite):
-        raise RunError(f"{out} already holds a search: add --resume to continue it, --overwrite to replace it, or choose "
-                       "another folder with --out")  # fmt: skip
+        raise RunError(
+            f"{out} already holds a search: add --resume to continue it, --overwrite to replace it, or choose another "
+            "folder with --out"
+        )
     workspace = make_workspace(domain, shape=shape, prefix=prefix, pots=pots)
     try:
         result = search(

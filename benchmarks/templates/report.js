@@ -4,7 +4,7 @@
   const $ = (id) => document.getElementById(id);
   const SVG = $("icons").namespaceURI;
   const [rowAxis, columnAxis] = data.axes;
-  const STATIONS = { T: "tomato", O: "onion", C: "cabbage", F: "fish", D: "dishes", P: "pot", S: "serving" };
+  const STATIONS = { T: "tomato", O: "onion", C: "cabbage", F: "fish", D: "dish", P: "pot", S: "serving" };
 
   // -- small helpers ---------------------------------------------------------------------------------------------------
 
@@ -74,20 +74,19 @@
   const at = new Map(cells.map((cell) => [cell.row * columnAxis.count + cell.column, cell]));
   const values = cells.map((cell) => cell.objective);
   const [low, high] = [Math.min(...values), Math.max(...values)];
-  // The worst few cells are much worse than the rest: the ramp starts at the fifth percentile.
-  const floorValue = values.length > 20 ? values[Math.floor(values.length * 0.95)] : low;
+  // The worst cells are much worse than the rest: the ramp starts at the tenth percentile.
+  const floorValue = values.length > 20 ? values[Math.floor(values.length * 0.9)] : low;
   const shade = (value) => ramp(high > floorValue ? Math.max(0, Math.min(1, (value - floorValue) / (high - floorValue))) : 1);
   const cellWidth = Math.max(7, Math.min(26, 640 / columnAxis.count));
-  const cellHeight = Math.max(6, Math.min(22, 600 / rowAxis.count));
-  const short = (label) => {
-    const words = String(label).split(/[^A-Za-z]+/).filter(Boolean);
-    return words.length > 1 ? words.map((word) => word[0].toUpperCase()).join("") : String(label);
-  };
-  const longest = Math.max(...columnAxis.labels.map((label) => short(label).length));
+  const cellHeight = Math.max(6, Math.min(26, 560 / rowAxis.count));
+  const isOrder = (label) => [...String(label)].every((symbol) => STATIONS[symbol]);
+  const inWords = (label) => isOrder(label) ? [...label].map((symbol) => STATIONS[symbol]).join(" · ") : String(label);
+  const longest = Math.max(...columnAxis.labels.map((label) => label.length));
   const margin = { left: 44, top: 4, bottom: 14 + longest * 6.6 + 22 };
   const size = { width: margin.left + columnAxis.count * cellWidth + 2, height: margin.top + rowAxis.count * cellHeight + margin.bottom };
   const cellX = (column) => margin.left + column * cellWidth;
   const cellY = (row) => margin.top + (rowAxis.count - 1 - row) * cellHeight;
+  const axisName = (name) => ({ obstacles: "virtual obstacles", order: "reading order of the ingredients" })[name] || name;
   const columnNames = [], rowNames = [];
   let picture, cursor, pinned = cells[0], shown = null;
 
@@ -106,14 +105,14 @@
     columnAxis.labels.forEach((label, i) => {
       const x = cellX(i) + cellWidth / 2, y = size.height - margin.bottom + 10;
       const text = svg("text", { class: "mono", transform: `translate(${x + 3.5} ${y}) rotate(-90)`, "text-anchor": "end" });
-      if (i % every === 0) text.textContent = short(label);
+      if (i % every === 0) text.textContent = label;
       columnNames.push(text);
       const title = svg("title");
-      title.textContent = columnAxis.step > 1 ? `from ${label}` : label;
+      title.textContent = (columnAxis.step > 1 ? "from " : "") + inWords(label);
       text.append(title);
       picture.append(text);
     });
-    const everyRow = Math.max(1, Math.ceil(14 / cellHeight), rowAxis.count > 12 ? 5 : 1);
+    const everyRow = Math.max(1, Math.ceil(14 / cellHeight), rowAxis.count > 30 ? 5 : 1);
     rowAxis.labels.forEach((label, i) => {
       const text = svg("text", { x: margin.left - 8, y: cellY(i) + cellHeight / 2 + 4, "text-anchor": "end" });
       if (i % everyRow === 0) text.textContent = label;
@@ -121,9 +120,9 @@
       picture.append(text);
     });
     const under = svg("text", { x: margin.left + columnAxis.count * cellWidth / 2, y: size.height - 4, "text-anchor": "middle" });
-    under.textContent = columnAxis.name + " →";
+    under.textContent = axisName(columnAxis.name) + " →";
     const beside = svg("text", { transform: `translate(10 ${margin.top + rowAxis.count * cellHeight / 2}) rotate(-90)`, "text-anchor": "middle" });
-    beside.textContent = rowAxis.name + " →";
+    beside.textContent = axisName(rowAxis.name) + " →";
     picture.append(under, beside);
     if (cells.length) {
       const best = { x: cellX(cells[0].column), y: cellY(cells[0].row) };
@@ -143,6 +142,8 @@
     const parts = [el("span", {}, names[data.objective.name] || data.objective.name), el("span", {}, (low < floorValue ? "≤ " : "") + number(floorValue)), bar, el("span", {}, number(high)), el("span", { class: "swatch ring" }), "best"];
     if (cells.length < rowAxis.count * columnAxis.count) parts.push(el("span", { class: "swatch" }), "none found");
     if (rowAxis.step * columnAxis.step > 1) parts.push(el("span", {}, `each square: the best of ${rowAxis.step * columnAxis.step} cells`));
+    const rows = rowAxis.labels.length * rowAxis.step;
+    if (rows < rowAxis.whole) parts.push(el("span", {}, `rows ${rows} to ${rowAxis.whole - 1} are empty and left out`));
     $("legend").append(...parts);
   }
   function pairs(items) {
@@ -159,7 +160,7 @@
     rowNames.forEach((text, i) => text.classList.toggle("on", i === cell.row));
     $("board").replaceChildren(cell.layout ? board(cell.layout, data.shape) : el("div", { class: "missing" }, "The page carries the drawings of the best cells only; this layout lies in archive.npz."));
     const obstacles = cell.layout ? [...cell.layout].filter((s) => s === "V").length : rowAxis.labels[cell.row];
-    const order = String(columnAxis.labels[cell.column]).split(/[^A-Za-z]+/).filter(Boolean).join(" · ") || columnAxis.labels[cell.column];
+    const order = inWords(columnAxis.labels[cell.column]);
     const facts = [["Legibility", number(cell.legibility)], ["Distance", number(cell.distance, 1)], ["Obstacles", String(obstacles)]];
     if (!["legibility", "efficiency"].includes(data.objective.name)) facts.unshift([data.objective.name, number(cell.objective)]);
     $("readout").replaceChildren(el("p", { class: "order" }, (columnAxis.step > 1 ? "near " : "") + order), pairs(facts), el("div", { class: "rank" }, `rank ${number(cell.rank + 1, 0)} of ${number(cells.length, 0)}`));
@@ -259,7 +260,7 @@
       seen.add(cell.column);
       const card = el("button", { type: "button", class: "card", "aria-label": `Show the layout of rank ${cell.rank + 1} on the map` }, board(cell.layout, data.shape));
       card.addEventListener("click", () => { pin(cell); $("map").focus({ preventScroll: true }); $("h-archive").scrollIntoView({ behavior: matchMedia("(prefers-reduced-motion: reduce)").matches ? "auto" : "smooth" }); });
-      $("best").append(el("figure", {}, card, el("figcaption", {}, el("div", { class: "name" }, number(cell.objective)), el("p", { class: "note" }, `${short(columnAxis.labels[cell.column])} · ${plural([...cell.layout].filter((s) => s === "V").length, "obstacle")} · distance ${number(cell.distance, 1)}`))));
+      $("best").append(el("figure", {}, card, el("figcaption", {}, el("div", { class: "name" }, number(cell.objective)), el("p", { class: "note" }, `${columnAxis.labels[cell.column]} · ${plural([...cell.layout].filter((s) => s === "V").length, "obstacle")} · distance ${number(cell.distance, 1)}`))));
     }
   }
 
