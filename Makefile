@@ -1,0 +1,70 @@
+# make demo   install into .venv and run the main job (no torch needed)
+# make test   install everything the tests need and run them
+# make help   list all targets
+
+PYTHON ?= python3
+VENV ?= .venv
+# Installed first and pinned, so that no package pulls in a build with CUDA. `make test TORCH=` goes without.
+TORCH ?= torch==2.13.0
+PYTEST_ARGS ?= -n auto
+
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
+LOCKED := requirements/constraints.txt
+EXAMPLE := docs/examples/legible-emitter-example
+
+.PHONY: help demo test lint format bench lock clean
+.DEFAULT_GOAL := help
+
+help:
+	@sed -n 's/^# make/make/p' $(MAKEFILE_LIST)
+
+$(BIN)/python:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	  { echo "Python >= 3.11 is needed; '$(PYTHON)' is $$($(PYTHON) --version 2>&1). Try: make $(MAKECMDGOALS) PYTHON=python3.12"; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/.run-installed: $(LOCKED) pyproject.toml | $(BIN)/python
+	@echo "Installing into $(VENV) (pinned versions) ..."
+	$(PIP) -c $(LOCKED) -e .
+	@touch $@
+
+$(VENV)/.test-installed: $(LOCKED) pyproject.toml | $(BIN)/python
+	@echo "Installing the test environment into $(VENV) (pinned versions) ..."
+	$(if $(TORCH),$(PIP) $(TORCH))
+	$(PIP) -c $(LOCKED) -e '.[dev]'
+	$(PIP) -c $(LOCKED) --no-deps -e $(EXAMPLE)
+	@touch $@ $(VENV)/.run-installed
+
+demo: $(VENV)/.run-installed
+	$(BIN)/legible demo --out runs/demo
+
+test: $(VENV)/.test-installed
+	-$(BIN)/legible humans fetch
+	$(BIN)/python -m pytest $(PYTEST_ARGS)
+
+# make lint   style, formatting and types
+lint: $(VENV)/.test-installed
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+# make format   put the code into the project's style
+format: $(VENV)/.test-installed
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+# make bench   speed, as ratios within one run, with peers beside it
+bench: $(VENV)/.run-installed
+	$(BIN)/legible bench --peers
+
+# make lock   pin the newest versions that fit pyproject.toml
+lock: | $(BIN)/python
+	$(PIP) uv
+	$(BIN)/uv pip compile --quiet --universal --upgrade --python-version 3.11 --no-emit-index-url --no-emit-find-links \
+	  --no-header --no-annotate pyproject.toml --extra dev --extra distributed --extra minari --extra docs -o $(LOCKED)
+	echo "torch==2.13.0" >> $(LOCKED)
+
+# make clean   remove environments, caches and runs
+clean:
+	rm -rf .venv .venv-* runs build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
