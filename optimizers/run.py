@@ -19,6 +19,7 @@ from optimizers.checkpoint import CheckpointFolder, Header
 from optimizers.emitters.registry import EmitterSpec, emitter_name, make_emitter
 from optimizers.errors import CheckpointError, EmitterError, SearchError
 from optimizers.evaluate import Evaluator
+from optimizers.files import remove_leftovers
 from optimizers.result import SearchResult
 from optimizers.run_folder import RunFolder, git_revision, package_versions, pickle_versions, platform_name
 
@@ -98,6 +99,7 @@ class Run:
             self._checkpoints = CheckpointFolder(self.folder.checkpoints, {"workspace": self.workspace})
             if resume is True or (resume == "auto" and self.folder.holds_a_run):
                 self.state = self._checkpoints.load(self._settings, pickle_versions())
+                remove_leftovers(self.folder.path)
             else:
                 self.folder.create(overwrite=overwrite)
                 # The first checkpoint comes before any other file: whatever has a manifest can be resumed.

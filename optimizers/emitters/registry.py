@@ -19,8 +19,8 @@ Any other is wrapped in :class:`~optimizers.emitters.adapter.GenomeAdapter`, whi
 pickle, or runs with it cannot be checkpointed. ``settings`` (a dict) is written to the run's manifest if present.
 
 **Emitters that know no workspace** (pyribs' own): where the factory has no ``workspace`` parameter it gets the archive
-with real-valued genomes, and a random layout as ``x0`` where it takes one. It is not told the bounds: what it proposes is
-rounded and clipped (pyribs' evolution strategies would redraw until every gene is inside, which on a few small integer
+with real-valued genomes, and a random layout as ``x0`` where it takes one. It is not told the bounds: what it proposes
+is rounded and clipped (pyribs' evolution strategies would redraw until every gene is inside, which on small integer
 ranges may take forever).
 
 **A plain function** works too: any function with a parameter named ``rng``, called as ``propose(archive, workspace,
