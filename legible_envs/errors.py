@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["LayoutError", "TaskError"]
+__all__ = ["LayoutError", "TaskError", "WorkspaceError"]
 
 
 class LayoutError(ValueError):
@@ -28,3 +28,18 @@ def _rebuild_layout_error(message: str, rule: str, cell: tuple[int, int] | None)
 
 class TaskError(ValueError):
     """A task graph is malformed: a cycle, an unknown name, or no valid sequence."""
+
+
+class WorkspaceError(ValueError):
+    """A workspace breaks the contract of :class:`~legible_envs.workspace.Workspace`.
+
+    Attributes:
+        problems: One sentence for each thing that is wrong.
+    """
+
+    def __init__(self, message: str, problems: tuple[str, ...] = ()) -> None:
+        super().__init__(message)
+        self.problems = problems
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return WorkspaceError, (str(self), self.problems)

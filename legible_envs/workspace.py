@@ -356,3 +356,11 @@ def check_choice(name: str, value: Any, allowed: Sequence[Any]) -> Any:
     if value not in allowed:
         raise ValueError(f"{name} must be one of {list(allowed)}, got {value!r}")
     return value
+
+
+def __getattr__(name: str) -> object:
+    if name == "check_workspace":
+        from legible_envs.workspace_checks import check_workspace
+
+        return check_workspace
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,0 +1,166 @@
+"""What a third-party workspace gets wrong, in words."""
+
+from __future__ import annotations
+
+import json
+import pickle
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from legible_envs.errors import LayoutError, WorkspaceError
+from legible_envs.workspace import Workspace, make_workspace
+
+__all__ = ["check_workspace"]
+
+SAMPLES = 64
+CHILDREN = 4
+
+
+def check_workspace(workspace: Workspace, *, seed: int = 0) -> None:
+    """Check everything a search, an environment or a report relies on.
+
+    Bounds, samples, children, scores, measures, decoding, pruning, pickling, configuration, repeatability, and that
+    the global random state stays alone.
+
+    Args:
+        workspace: The workspace to try.
+        seed: Seed of the trial.
+
+    Raises:
+        WorkspaceError: Something is wrong; ``problems`` lists each in a sentence.
+    """
+    if not isinstance(workspace, Workspace):
+        raise WorkspaceError(f"expected a Workspace, got {type(workspace).__name__}", problems=("not a Workspace",))
+    problems: list[str] = []
+    before = _global_random_state()
+    for check in (_genomes, _variation, _scores, _one_layout, _configuration):
+        try:
+            problems += check(workspace, seed)
+        except Exception as error:
+            problems.append(f"{check.__name__.strip('_')}: raised {type(error).__name__}: {error}")
+    if _global_random_state() != before:
+        problems.append("it draws from numpy's global random state; use only the generator it is given")
+    if problems:
+        listed = "\n".join(f"- {problem}" for problem in problems)
+        raise WorkspaceError(f"{type(workspace).__name__} breaks the workspace contract:\n{listed}", tuple(problems))
+
+
+def _global_random_state() -> bytes:
+    return pickle.dumps(np.random.get_state())  # noqa: NPY002 - watched, not used
+
+
+def _rng(seed: int) -> np.random.Generator:
+    return np.random.default_rng(seed)
+
+
+def _genomes(workspace: Workspace, seed: int) -> Iterator[str]:
+    d, low, high = workspace.genome_size, workspace.lower_bounds, workspace.upper_bounds
+    if np.shape(low) != (d,) or np.shape(high) != (d,):
+        yield f"bounds have shapes {np.shape(low)} and {np.shape(high)}; expected ({d},) each"
+        return
+    if (np.asarray(low) > np.asarray(high)).any():
+        yield "some lower bounds exceed the upper bounds"
+    genomes = workspace.sample(SAMPLES, _rng(seed))
+    yield from _batch_problems(workspace, genomes, SAMPLES, "sample")
+    if not np.array_equal(genomes, workspace.sample(SAMPLES, _rng(seed))):
+        yield "sample gives different genomes for the same seed"
+    if np.array_equal(genomes, workspace.sample(SAMPLES, _rng(seed + 1))):
+        yield "sample gives the same genomes for different seeds"
+
+
+def _batch_problems(workspace: Workspace, genomes: Any, n: int, method: str) -> Iterator[str]:
+    expected = (n, workspace.genome_size)
+    if not isinstance(genomes, np.ndarray) or genomes.shape != expected:
+        yield f"{method} returned {type(genomes).__name__} of shape {np.shape(genomes)}; expected an array {expected}"
+        return
+    if genomes.dtype != workspace.genome_dtype:
+        yield f"{method} returned dtype {genomes.dtype}; genome_dtype is {workspace.genome_dtype}"
+    if (genomes < workspace.lower_bounds).any() or (genomes > workspace.upper_bounds).any():
+        yield f"{method} returned genes out of bounds"
+    valid = workspace.valid(genomes)
+    if np.shape(valid) != (n,):
+        yield f"valid returned shape {np.shape(valid)} for {n} genomes"
+    elif not np.all(valid):
+        yield f"{method} returned {n - int(np.sum(valid))} of {n} genomes that `valid` rejects"
+
+
+def _variation(workspace: Workspace, seed: int) -> Iterator[str]:
+    parents = workspace.sample(8, _rng(seed))
+    kept = parents.copy()
+    if workspace.phases < 1:
+        yield f"phases is {workspace.phases}; expected at least 1"
+    for phase in range(workspace.phases):
+        children = workspace.perturb(parents, CHILDREN, _rng(seed), phase=phase)
+        yield from _batch_problems(workspace, children, 8 * CHILDREN, f"perturb (phase {phase})")
+        if not np.array_equal(children, workspace.perturb(parents, CHILDREN, _rng(seed), phase=phase)):
+            yield f"perturb (phase {phase}) gives different children for the same seed"
+        if np.array_equal(children, np.repeat(parents, CHILDREN, axis=0)):
+            yield f"perturb (phase {phase}) changes nothing"
+    if not np.array_equal(parents, kept):
+        yield "perturb changes its parents in place"
+
+
+def _scores(workspace: Workspace, seed: int) -> Iterator[str]:
+    genomes = workspace.sample(SAMPLES, _rng(seed))
+    results: dict[str, Callable[[Any], Any]] = {
+        "legibility": workspace.legibility,
+        "distance": workspace.distance,
+        "penalty": workspace.penalty,
+    }
+    for name, method in results.items():
+        values = np.asarray(method(genomes))
+        if values.shape != (SAMPLES,):
+            yield f"{name} returned shape {values.shape} for {SAMPLES} genomes"
+        elif not np.isfinite(values).all():
+            yield f"{name} is not finite for {int((~np.isfinite(values)).sum())} of {SAMPLES} valid genomes"
+        elif not np.array_equal(values, method(genomes)):
+            yield f"{name} gives different values for the same genomes"
+        elif not np.allclose(values[:5], method(genomes[:5]), rtol=1e-12, atol=1e-12):
+            yield f"{name} of a layout depends on the batch it is in"
+    measures = np.asarray(workspace.measures(genomes))
+    ranges = np.asarray(workspace.archive_ranges, dtype=float)
+    if measures.shape != (SAMPLES, 2) or ranges.shape != (2, 2) or len(workspace.archive_dims) != 2:
+        yield f"measures {measures.shape}, archive_ranges {ranges.shape}, archive_dims: expected (n, 2), (2, 2) and two"
+    elif (measures < ranges[:, 0]).any() or (measures > ranges[:, 1]).any():
+        yield "some measures lie outside archive_ranges"
+    if len(workspace.measure_names) != 2:
+        yield f"measure_names must be two names, got {workspace.measure_names!r}"
+
+
+def _one_layout(workspace: Workspace, seed: int) -> Iterator[str]:
+    for genome in workspace.sample(2, _rng(seed)):
+        layout = workspace.decode(genome)
+        if not np.allclose(workspace.encode(layout), genome, rtol=1e-9, atol=1e-9):
+            yield "encode(decode(genome)) is another genome"
+            break
+        for name, result in (("summary", workspace.summary(genome)), ("explain", workspace.explain(genome))):
+            try:
+                json.dumps(result)
+            except (TypeError, ValueError) as error:
+                yield f"{name} is not plain data: {error}"
+        before, after = workspace.legibility(genome), workspace.legibility(workspace.prune(genome))
+        if after < before - 1e-6 * max(1.0, abs(before)):
+            yield f"prune lowered the legibility from {before:g} to {after:g}"
+    broken = np.full(workspace.genome_size, np.nan)
+    if not np.isnan(np.asarray(workspace.legibility(broken[None]))).all():
+        yield "a genome of NaN has a score; expected NaN"
+    try:
+        workspace.decode(broken)
+        yield "decode accepts a genome of NaN; expected a LayoutError"
+    except LayoutError:
+        pass
+
+
+def _configuration(workspace: Workspace, seed: int) -> Iterator[str]:
+    genomes = workspace.sample(8, _rng(seed))
+    copies = {"a pickled copy": pickle.loads(pickle.dumps(workspace))}
+    config = json.loads(json.dumps(workspace.to_config()))
+    if config.get("workspace") != workspace.name:
+        yield f"to_config()['workspace'] is {config.get('workspace')!r}; its name is {workspace.name!r}"
+    else:
+        copies["the workspace made from to_config()"] = make_workspace(config)
+    for what, copy in copies.items():
+        if not np.array_equal(copy.legibility(genomes), workspace.legibility(genomes)):
+            yield f"{what} scores differently"
