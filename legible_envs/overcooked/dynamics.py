@@ -324,16 +324,21 @@ def interact(state: Vector, kitchen: Kitchen, rules: Vector, player: int) -> int
 @kernel
 def _move_together(state: Vector, targets: Vector) -> None:
     """Move all players to their targets, except those whose moves would share or swap cells with another's."""
+    stuck = np.empty(targets.shape[0], dtype=np.bool_)
     blocked = True
     while blocked:
-        blocked = False
+        stuck[:] = False
         for a in range(targets.shape[0]):
             for b in range(a):
-                cell_a, cell_b = state[AT_PLAYERS + 3 * a], state[AT_PLAYERS + 3 * b]
-                swap = targets[a] == cell_b and targets[b] == cell_a
-                if (targets[a] == targets[b] or swap) and (targets[a] != cell_a or targets[b] != cell_b):
-                    targets[a], targets[b] = cell_a, cell_b
-                    blocked = True
+                swap = targets[a] == state[AT_PLAYERS + 3 * b] and targets[b] == state[AT_PLAYERS + 3 * a]
+                if targets[a] == targets[b] or swap:
+                    stuck[a] = stuck[b] = True
+        blocked = False
+        for player in range(targets.shape[0]):
+            # Whoever stays may now be in the way of another, so look again.
+            if stuck[player] and targets[player] != state[AT_PLAYERS + 3 * player]:
+                targets[player] = state[AT_PLAYERS + 3 * player]
+                blocked = True
     for player in range(targets.shape[0]):
         state[AT_PLAYERS + 3 * player] = targets[player]
 

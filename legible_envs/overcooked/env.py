@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -11,12 +11,12 @@ import numpy.typing as npt
 from gymnasium import spaces
 
 from legible_envs.overcooked import batch
-from legible_envs.overcooked.dynamics import CROSSINGS, DELIVERIES, STATE_SIZE
+from legible_envs.overcooked.dynamics import CROSSINGS, DELIVERIES, STATE_SIZE, Kitchen, Vector
 from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.overcooked.observations import grid_observation, vector_observation
 from legible_envs.overcooked.recipes import PAPER_SOUPS
 from legible_envs.overcooked.settings import JsonSpec, KitchenSettings, PackedKitchen, check_options, read_layout
-from legible_envs.overcooked.snapshot import draw_small, make_view, to_text
+from legible_envs.overcooked.snapshot import draw_small, make_view, name_goals, to_text
 from legible_envs.overcooked.view import GameView
 
 __all__ = ["OvercookedEnv"]
@@ -24,7 +24,7 @@ __all__ = ["OvercookedEnv"]
 NUM_ACTIONS = 6
 
 
-class OvercookedEnv(JsonSpec, gym.Env[npt.NDArray[Any], int]):
+class OvercookedEnv(JsonSpec, gym.Env[npt.NDArray[Any], Any]):
     """A person cooks soups in a kitchen whose layout can be changed from episode to episode.
 
     ## Description
@@ -149,9 +149,9 @@ class OvercookedEnv(JsonSpec, gym.Env[npt.NDArray[Any], int]):
     ## Version History
 
     * v0: first version.
-    """
+    """  # noqa: E501
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array", "ansi"], "render_fps": 8}
+    metadata = {"render_modes": ["human", "rgb_array", "ansi"], "render_fps": 8}  # noqa: RUF012
 
     def __init__(
         self,
@@ -188,8 +188,7 @@ class OvercookedEnv(JsonSpec, gym.Env[npt.NDArray[Any], int]):
         self._chosen: OvercookedLayout | None = None
         self._pending: PackedKitchen | None = None
         self._actions = np.zeros(1, dtype=np.int64)
-        self._goals = np.zeros(self.settings.shape, dtype=np.bool_)
-        self._flat_goals = self._goals.reshape(-1)
+        self._goals = np.zeros(self.settings.shape[0] * self.settings.shape[1], dtype=np.bool_)
         self._window: Any = None
         self._observation_shape = self.observation_space.shape
         self._install(self.settings.pack(self.settings.preview()))
@@ -223,7 +222,7 @@ class OvercookedEnv(JsonSpec, gym.Env[npt.NDArray[Any], int]):
             layout = self.settings.distribution.sample(self.np_random)
         self._enter(layout)
         mask = np.empty(NUM_ACTIONS, dtype=np.int8)
-        batch.begin(self._state, self._kitchen, self._rules, self._flat_goals, mask)
+        batch.begin(self._state, self._kitchen, self._rules, self._goals, mask)
         if self.render_mode == "human":
             self.render()
         return self._observe(), self._info(mask)
@@ -249,7 +248,7 @@ class OvercookedEnv(JsonSpec, gym.Env[npt.NDArray[Any], int]):
             raise ValueError(f"expected an action 0..{NUM_ACTIONS - 1}, got {action!r}")
         mask = np.empty(NUM_ACTIONS, dtype=np.int8)
         reward, over = batch.play(
-            self._state, self._kitchen, self._rules, self.settings.weights, self._actions, self._flat_goals, mask
+            self._state, self._kitchen, self._rules, self.settings.weights, self._actions, self._goals, mask
         )
         if self.render_mode == "human":
             self.render()
@@ -330,7 +329,7 @@ class OvercookedEnv(JsonSpec, gym.Env[npt.NDArray[Any], int]):
 
     def _info(self, mask: npt.NDArray[np.int8]) -> dict[str, Any]:
         return {
-            "valid_goals": self._goals.copy(),
+            "valid_goals": self._goals.reshape(self.settings.shape).copy(),
             "action_mask": mask,
             "layout_id": self._packed.layout.layout_id,
             "deliveries": int(self._state[DELIVERIES]),
@@ -343,11 +342,13 @@ class OvercookedEnv(JsonSpec, gym.Env[npt.NDArray[Any], int]):
         """A snapshot of the game in words, for drawing."""
         return make_view(self._packed.layout, self._state, self._rules, self.settings.rules)
 
+    def arrays(self) -> tuple[Vector, Kitchen, Vector]:
+        """The game's ``(state, kitchen, rules)`` as described in ``dynamics``; not copies, to be read only."""
+        return self._state, self._kitchen, self._rules
+
     def valid_goal_names(self) -> tuple[str, ...]:
-        """Names of the cells in ``info["valid_goals"]``, in reading order; counters are called ``counter@(row,col)``."""
-        layout = self._packed.layout
-        cells = [(int(row), int(col)) for row, col in np.argwhere(self._goals)]
-        return tuple(layout.station_at(cell) or f"counter@({cell[0]},{cell[1]})" for cell in cells)
+        """Names of the cells in ``info["valid_goals"]``, in reading order; counters are ``counter@(row,col)``."""
+        return name_goals(self._packed.layout, self._goals)
 
     @staticmethod
     def get_keys_to_action() -> dict[tuple[int, ...], int]:

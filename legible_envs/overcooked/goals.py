@@ -61,7 +61,9 @@ def missing_station(kitchen: Kitchen, rules: Vector, player: int) -> int:
 
 
 @kernel
-def _pot_goals(state: Vector, kitchen: Kitchen, rules: Vector, region: int, held: int, goals: Vector) -> bool:
+def _pot_goals(
+    state: Vector, kitchen: Kitchen, rules: Vector, region: int, held: int, goals: npt.NDArray[np.bool_]
+) -> bool:
     """Mark the pots that take what is held; whether there are any."""
     found = False
     for number in range(rules[NUM_POTS]):

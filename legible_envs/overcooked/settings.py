@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
+from enum import Enum
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -102,7 +103,7 @@ class PackedKitchen(NamedTuple):
     layout: OvercookedLayout
     rules: Vector
     kitchen: Kitchen
-    routes: npt.NDArray[np.int16] | None
+    routes: npt.NDArray[np.int16]
 
 
 class KitchenSettings:
@@ -167,7 +168,7 @@ class KitchenSettings:
         kitchen = pack_kitchen(layout, rules)
         self._check_playable(layout, kitchen, rules)
         if self.obs_type != "vector":
-            return PackedKitchen(layout, rules, kitchen, None)
+            return PackedKitchen(layout, rules, kitchen, np.empty((0, 2, 0), dtype=np.int16))
         routes = np.empty((7, 2, self.shape[0] * self.shape[1]), dtype=np.int16)
         find_routes(kitchen, rules, routes)
         return PackedKitchen(layout, rules, kitchen, routes)
@@ -268,6 +269,8 @@ def _plain(value: Any) -> Any:
     """Plain data that means the same to the environment."""
     if isinstance(value, OvercookedLayout):
         return value.to_ascii()
+    if isinstance(value, Enum):
+        return value.value
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     if isinstance(value, Mapping):

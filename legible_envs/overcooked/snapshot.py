@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -24,7 +26,7 @@ from legible_envs.overcooked.layout import INGREDIENTS, OvercookedLayout
 from legible_envs.overcooked.rules import GameRules
 from legible_envs.overcooked.view import GameView, Item, PlayerView, PotView
 
-__all__ = ["RGB_TILE", "draw_small", "make_view", "to_text"]
+__all__ = ["RGB_TILE", "draw_small", "make_view", "name_goals", "tile_pictures", "to_text"]
 
 RGB_TILE: Final = 12
 """Pixels per cell of an ``rgb`` observation."""
@@ -101,8 +103,32 @@ def _describe(item: Item | None) -> str:
     return f"a soup of {' '.join(item.contents)}" if item.kind == "soup" else item.kind
 
 
+def name_goals(layout: OvercookedLayout, goals: npt.NDArray[np.bool_]) -> tuple[str, ...]:
+    """Names of the marked cells, in reading order; counters are ``counter@(row,col)``.
+
+    Args:
+        layout: The kitchen.
+        goals: ``(H*W,)`` or ``(H, W)``.
+    """
+    cells = [(int(row), int(col)) for row, col in np.argwhere(np.reshape(goals, layout.shape))]
+    return tuple(layout.station_at(cell) or f"counter@({cell[0]},{cell[1]})" for cell in cells)
+
+
 def draw_small(view: GameView) -> npt.NDArray[np.uint8]:
     """The picture of an ``rgb`` observation, ``(H * RGB_TILE, W * RGB_TILE, 3)``."""
     from legible_envs.overcooked.rendering import draw_game
 
     return np.array(draw_game(view, tile=RGB_TILE, hud=False), dtype=np.uint8)
+
+
+def tile_pictures(views: Sequence[GameView], side: int = 1200) -> npt.NDArray[np.uint8]:
+    """All games in one picture of about ``side`` pixels, row by row."""
+    from legible_envs.overcooked.rendering import draw_game
+
+    columns = math.ceil(math.sqrt(len(views)))
+    height, width = views[0].layout.shape
+    tile = max(8, min(48, side // (columns * max(height, width))))
+    pictures = [np.asarray(draw_game(view, tile=tile, hud=False), dtype=np.uint8) for view in views]
+    pictures += [np.full_like(pictures[0], 255)] * (-len(pictures) % columns)
+    rows = [np.concatenate(pictures[i : i + columns], axis=1) for i in range(0, len(pictures), columns)]
+    return np.concatenate(rows, axis=0)

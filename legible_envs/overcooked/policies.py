@@ -1,0 +1,181 @@
+"""A scripted cook: shortest paths to a random valid goal. A baseline, and a player who finishes every valid kitchen."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from legible_envs.compiled import kernel
+from legible_envs.overcooked.dynamics import (
+    AT_PLAYERS,
+    HEIGHT,
+    INTERACT,
+    STAY,
+    WIDTH,
+    Kitchen,
+    Vector,
+    neighbour,
+    walkable,
+)
+from legible_envs.overcooked.layout import OBSTACLE
+
+__all__ = ["ScriptedPlayer", "choose_action", "find_distances"]
+
+
+@kernel
+def find_distances(goal: int, kitchen: Kitchen, rules: Vector, avoid: bool, distances: npt.NDArray[np.int32]) -> None:
+    """Write the steps from every cell to one beside the goal.
+
+    Args:
+        goal: Flat cell of a station or counter.
+        kitchen: See ``dynamics``.
+        rules: See ``dynamics``.
+        avoid: Whether to keep off virtual obstacles, even those that can be crossed.
+        distances: ``(H*W,)``, written; -1 where there is no way.
+    """
+    queue = np.empty(rules[HEIGHT] * rules[WIDTH], dtype=np.int32)
+    distances[:] = -1
+    head, tail = 0, 0
+    for direction in range(4):
+        cell = neighbour(goal, direction, rules)
+        if cell >= 0 and walkable(kitchen[cell], rules) and not (avoid and kitchen[cell] == OBSTACLE):
+            distances[cell] = 0
+            queue[tail] = cell
+            tail += 1
+    while head < tail:
+        cell = queue[head]
+        head += 1
+        for direction in range(4):
+            beside = neighbour(cell, direction, rules)
+            if beside < 0 or distances[beside] >= 0 or not walkable(kitchen[beside], rules):
+                continue
+            if not (avoid and kitchen[beside] == OBSTACLE):
+                distances[beside] = distances[cell] + 1
+                queue[tail] = beside
+                tail += 1
+
+
+@kernel
+def choose_action(
+    state: Vector, rules: Vector, goal: int, distances: npt.NDArray[np.int32], can_interact: bool, chance: float
+) -> int:
+    """Next action on a shortest path to the goal; STAY beside a pot that is not ready yet.
+
+    Args:
+        state: See ``dynamics``.
+        rules: See ``dynamics``.
+        goal: Flat cell of the goal.
+        distances: Made by :func:`find_distances` for this goal.
+        can_interact: Whether INTERACT would do something now.
+        chance: Number in [0, 1) that picks one of the equally good steps.
+    """
+    cell = state[AT_PLAYERS]
+    options = np.empty(4, dtype=np.int64)
+    count = 0
+    for direction in range(4):
+        beside = neighbour(cell, direction, rules)
+        if distances[cell] == 0:
+            if beside == goal:
+                if state[AT_PLAYERS + 1] != direction:
+                    return direction
+                return INTERACT if can_interact else STAY
+        elif beside >= 0 and 0 <= distances[beside] < distances[cell]:
+            options[count] = direction
+            count += 1
+    if count == 0:
+        return STAY
+    return int(options[int(chance * count)])
+
+
+class ScriptedPlayer:
+    """Walks to a valid goal drawn uniformly, by a shortest path, uses it, and draws the next.
+
+    At every cell each step that shortens the way is equally likely. Soft virtual obstacles are kept off where there is
+    another way (see ``avoid_obstacles``). Reads the game from the environment, so it plays with every ``obs_type``,
+    under wrappers, and in vector environments.
+
+    Args:
+        env: An environment made by ``gymnasium.make("LegibleOvercooked-v0")``, or a vector environment of such.
+        rng: Source of all randomness.
+        avoid_obstacles: Whether to walk round soft virtual obstacles.
+
+    Example:
+        >>> import gymnasium as gym, legible_envs, numpy as np
+        >>> env = gym.make("LegibleOvercooked-v0")
+        >>> player = ScriptedPlayer(env, np.random.default_rng(0))
+        >>> obs, info = env.reset(seed=0)
+        >>> over = False
+        >>> while not over:
+        ...     obs, reward, terminated, truncated, info = env.step(player(obs, info))
+        ...     over = terminated or truncated
+        >>> info["deliveries"]
+        3
+    """
+
+    def __init__(self, env: Any, rng: np.random.Generator, *, avoid_obstacles: bool = True) -> None:
+        self.env = env
+        self.rng = rng
+        self.avoid_obstacles = avoid_obstacles
+        self.num_envs: int | None = getattr(env.unwrapped, "num_envs", None)
+        count = self.num_envs or 1
+        self._width = 1
+        self._goals = [-1] * count
+        self._layout_ids = [""] * count
+        self._distances: list[npt.NDArray[np.int32] | None] = [None] * count
+
+    def __call__(self, obs: Any, info: dict[str, Any]) -> Any:
+        """The next action, an integer; for a vector environment ``(N,)`` integers.
+
+        Args:
+            obs: The observation; not needed, taken so that every policy is called alike.
+            info: The info returned with it.
+        """
+        if self.num_envs is None:
+            return self._act(
+                0, self.env.unwrapped.arrays(), info["valid_goals"], info["action_mask"], info["layout_id"]
+            )
+        arrays = self.env.call("arrays")
+        keys = ("valid_goals", "action_mask", "layout_id")
+        return np.array([self._act(i, arrays[i], *(info[key][i] for key in keys)) for i in range(self.num_envs)])
+
+    def goal(self, index: int = 0) -> tuple[int, int] | None:
+        """``(row, col)`` of the goal walked to in a game, None between goals."""
+        return None if self._goals[index] < 0 else divmod(self._goals[index], self._width)
+
+    def _act(
+        self,
+        index: int,
+        arrays: tuple[Vector, Kitchen, Vector],
+        valid_goals: npt.NDArray[np.bool_],
+        action_mask: npt.NDArray[np.int8],
+        layout_id: str,
+    ) -> int:
+        state, kitchen, rules = arrays
+        self._width = int(rules[WIDTH])
+        marked = valid_goals.ravel()
+        if layout_id != self._layout_ids[index] or self._goals[index] < 0 or not marked[self._goals[index]]:
+            choices = np.flatnonzero(marked)
+            if not len(choices):
+                return STAY
+            self._layout_ids[index] = layout_id
+            self._goals[index] = int(self.rng.choice(choices))
+            self._distances[index] = None
+        distances = self._distances[index]
+        if distances is None or distances[state[AT_PLAYERS]] < 0:
+            distances = self._distances[index] = self._find_way(self._goals[index], state, kitchen, rules)
+        action = choose_action(
+            state, rules, self._goals[index], distances, bool(action_mask[INTERACT]), float(self.rng.random())
+        )
+        if action == INTERACT:
+            self._goals[index] = -1
+        return int(action)
+
+    def _find_way(self, goal: int, state: Vector, kitchen: Kitchen, rules: Vector) -> npt.NDArray[np.int32]:
+        distances = np.empty(int(rules[HEIGHT] * rules[WIDTH]), dtype=np.int32)
+        find_distances(goal, kitchen, rules, self.avoid_obstacles, distances)
+        if self.avoid_obstacles and distances[state[AT_PLAYERS]] < 0:
+            # Standing on an obstacle, or shut in by them: the only way leads across.
+            find_distances(goal, kitchen, rules, False, distances)
+        return distances

@@ -1,0 +1,457 @@
+"""Many playable kitchens in one: compiled, a layout per game, and the same trajectories as ``SyncVectorEnv``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from gymnasium import spaces
+from gymnasium.error import ResetNeeded
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from legible_envs.overcooked import batch
+from legible_envs.overcooked.dynamics import CROSSINGS, DELIVERIES, STATE_SIZE, STEPS, Kitchen, Vector
+from legible_envs.overcooked.env import NUM_ACTIONS, OvercookedEnv
+from legible_envs.overcooked.layout import OvercookedLayout
+from legible_envs.overcooked.rules import pack_rules
+from legible_envs.overcooked.settings import (
+    JsonSpec,
+    KitchenSettings,
+    PackedKitchen,
+    check_options,
+    count_pots,
+    read_layout,
+)
+from legible_envs.overcooked.snapshot import draw_small, make_view, name_goals, tile_pictures, to_text
+from legible_envs.overcooked.view import GameView
+
+__all__ = ["OvercookedVectorEnv"]
+
+Infos = dict[str, Any]
+
+
+class OvercookedVectorEnv(JsonSpec, VectorEnv[npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any]]):
+    """``num_envs`` games of :class:`~legible_envs.overcooked.env.OvercookedEnv`, advanced by one compiled call.
+
+    Made by ``gymnasium.make_vec("LegibleOvercooked-v0", num_envs=N, vectorization_mode="vector_entry_point")``.
+    Observations, rewards, terminations, truncations and infos are those of ``SyncVectorEnv`` with the same seeds, in
+    all three autoreset modes. A layout per game: ``envs.set_attr("layout", [...])``, from each game's next reset on;
+    ``envs.reset(options={"layout": ...})`` puts all games into one kitchen.
+
+    Args:
+        num_envs: Number of games.
+        max_episode_steps: Steps after which an episode is truncated; None or -1: never.
+        autoreset_mode: ``gymnasium.vector.AutoresetMode`` or its value.
+        render_mode: None, ``"human"`` (all games in one window), ``"rgb_array"`` or ``"ansi"`` (one picture or drawing
+            per game).
+        **kwargs: As for :class:`~legible_envs.overcooked.env.OvercookedEnv`.
+
+    Raises:
+        LayoutError: See :class:`~legible_envs.overcooked.env.OvercookedEnv`.
+        ValueError: Likewise, and numbers out of range.
+    """
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        max_episode_steps: int | None = 1200,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        render_mode: str | None = None,
+        **kwargs: Any,
+    ) -> None:
+        super().__init__()
+        modes = OvercookedEnv.metadata["render_modes"]
+        if render_mode is not None and render_mode not in modes:
+            raise ValueError(f"`render_mode` must be None or one of {modes}, got {render_mode!r}")
+        if num_envs < 1:
+            raise ValueError(f"`num_envs` must be at least 1, got {num_envs}")
+        if max_episode_steps is not None and max_episode_steps < 1 and max_episode_steps != -1:
+            raise ValueError(
+                f"`max_episode_steps` must be positive, or None or -1 for no limit, got {max_episode_steps}"
+            )
+        self.settings = KitchenSettings(**kwargs)
+        self.num_envs = int(num_envs)
+        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.metadata = {**OvercookedEnv.metadata, "autoreset_mode": self.autoreset_mode}
+        self.render_mode = render_mode
+        self.max_episode_steps = None if max_episode_steps in (None, -1) else max_episode_steps
+        self.single_action_space = spaces.Discrete(NUM_ACTIONS)
+        self.single_observation_space = self.settings.observation_space()
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self._rngs: list[np.random.Generator | None] = [None] * self.num_envs
+        self._seeds = [-1] * self.num_envs
+        self._window: Any = None
+        self._done = np.zeros(self.num_envs, dtype=np.bool_)
+        self._begun = False
+        self._allocate(self.settings.pack(self.settings.preview()))
+
+    def _allocate(self, packed: PackedKitchen) -> None:
+        """Make the arrays, every game in the same kitchen."""
+        count = self.num_envs
+        cells = self.settings.shape[0] * self.settings.shape[1]
+        self._rules = packed.rules
+        self._num_pots = count_pots(packed.layout)
+        self._packed = [packed] * count
+        self._chosen: list[PackedKitchen | None] = [None] * count
+        self._ids = np.full(count, packed.layout.layout_id, dtype=object)
+        self._kitchens = np.repeat(packed.kitchen[None], count, axis=0)
+        self._routes = np.repeat(packed.routes[None], count, axis=0)
+        self._states = np.zeros((count, int(packed.rules[STATE_SIZE])), dtype=np.int32)
+        self._goals = np.zeros((count, cells), dtype=np.bool_)
+        self._observations_shape = (count, *self.single_observation_space.shape)  # type: ignore[misc]
+
+    # -- the Gymnasium interface --------------------------------------------------------------------------------------
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[npt.NDArray[Any], Infos]:
+        """Start all episodes, or those of a mask.
+
+        Args:
+            seed: None, a number (game ``i`` gets ``seed + i``), or one per game.
+            options: ``{"layout": …}`` for all games, and ``{"reset_mask": (N,) bool}`` to reset only some.
+
+        Returns:
+            ``(observations, infos)``.
+
+        Raises:
+            LayoutError: A bad kitchen; nothing is changed.
+            ValueError: Unknown option keys, or seeds or a mask of the wrong length.
+        """
+        asked = check_options(options, known=("layout", "reset_mask"))
+        seeds = self._read_seeds(seed)
+        which = self._read_mask(asked)
+        if "layout" in asked:
+            chosen = None if asked["layout"] is None else self._read(asked["layout"], None)
+            for i in np.flatnonzero(which):
+                self._chosen[i] = chosen
+        for i in np.flatnonzero(which):
+            if seeds[i] is not None:
+                self._rngs[i], self._seeds[i] = seeding.np_random(seeds[i])
+        self._done[which] = False
+        self._begun = True
+        masks = self._restart(which)
+        if self.render_mode == "human":
+            self.render()
+        return self._observe(), self._infos(masks, which)
+
+    def step(
+        self, actions: npt.NDArray[Any]
+    ) -> tuple[npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any], Infos]:
+        """Advance all games by one tick.
+
+        Args:
+            actions: ``(N,)`` integers 0..5.
+
+        Returns:
+            ``(observations, rewards, terminations, truncations, infos)``, the middle three of shape ``(N,)``.
+
+        Raises:
+            ResetNeeded: Before the first reset; or, without autoreset, while a finished game is not reset.
+            ValueError: Actions of another shape, or out of range.
+        """
+        moves = self._read_actions(actions)
+        self._check_begun()
+        restart = self._done
+        if self.autoreset_mode == AutoresetMode.NEXT_STEP:
+            for i in np.flatnonzero(restart):
+                self._enter_next(int(i))
+        rewards = np.empty(self.num_envs)
+        terminations = np.empty(self.num_envs, dtype=np.bool_)
+        masks = np.empty((self.num_envs, NUM_ACTIONS), dtype=np.int8)
+        batch.play_all(
+            self._states,
+            self._kitchens,
+            self._rules,
+            self.settings.weights,
+            moves,
+            restart,
+            self._goals,
+            masks,
+            rewards,
+            terminations,
+        )
+        if self.max_episode_steps is None:
+            truncations = np.zeros(self.num_envs, dtype=np.bool_)
+        else:
+            truncations = self._states[:, STEPS] >= self.max_episode_steps
+        self._done = terminations | truncations
+        infos: Infos = {}
+        if self.autoreset_mode == AutoresetMode.SAME_STEP and self._done.any():
+            infos = self._finish(self._done, masks)
+            self._restart(self._done, masks)
+            self._done = np.zeros(self.num_envs, dtype=np.bool_)
+        infos.update(self._infos(masks))
+        if self.render_mode == "human":
+            self.render()
+        return self._observe(), rewards, terminations, truncations, infos
+
+    def render(self) -> tuple[Any, ...] | None:
+        """One picture ``(H', W', 3)`` or drawing per game; with ``"human"`` all games in one window, and None."""
+        views = [self.view(i) for i in range(self.num_envs)]
+        if self.render_mode == "ansi":
+            return tuple(to_text(view) for view in views)
+        from legible_envs.overcooked.rendering import draw_game
+
+        if self.render_mode == "rgb_array":
+            return tuple(draw_game(view) for view in views)
+        if self.render_mode == "human":
+            from legible_envs.overcooked.window import Window
+
+            if self._window is None:
+                self._window = Window("Legible kitchens", fps=self.metadata["render_fps"])
+            self._window.show(tile_pictures(views))
+        return None
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Close the window, if there is one."""
+        if self._window is not None:
+            self._window.close()
+            self._window = None
+
+    # -- each game ----------------------------------------------------------------------------------------------------
+
+    def view(self, index: int) -> GameView:
+        """A snapshot of one game in words, for drawing."""
+        return make_view(self._packed[index].layout, self._states[index], self._rules, self.settings.rules)
+
+    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
+        """Call a method of every game, or get its attribute; as if each were an ``OvercookedEnv``.
+
+        Args:
+            name: ``layout``, ``view``, ``valid_goal_names``, ``render``, ``np_random``, ``np_random_seed``, or any
+                attribute that all games share, such as ``settings`` or ``render_mode``.
+            *args: Arguments of the method.
+            **kwargs: Arguments of the method.
+
+        Raises:
+            AttributeError: The games have nothing of this name.
+        """
+        values = [getattr(_Game(self, i), name) for i in range(self.num_envs)]
+        return tuple(value(*args, **kwargs) if callable(value) else value for value in values)
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """Get an attribute of every game; see :meth:`call`."""
+        return self.call(name)
+
+    def set_attr(self, name: str, values: Any) -> None:
+        """Set the kitchens of the games' next resets.
+
+        Args:
+            name: ``"layout"``; nothing else can be set.
+            values: A list or tuple of one kitchen per game, or one for all; None returns to the games' own.
+
+        Raises:
+            AttributeError: Another name.
+            ValueError: A list of another length.
+            LayoutError: A bad kitchen; nothing is changed.
+        """
+        if name != "layout":
+            raise AttributeError(f"only the attribute 'layout' can be set in the games of {self}, not {name!r}")
+        if not isinstance(values, list | tuple):
+            values = [values] * self.num_envs
+        if len(values) != self.num_envs:
+            raise ValueError(f"expected {self.num_envs} layouts, one per game, got {len(values)}")
+        known: dict[int, PackedKitchen] = {}
+        self._chosen = [None if value is None else self._read(value, known) for value in values]
+
+    @property  # type: ignore[misc]
+    def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
+        """The random generator of each game."""
+        return tuple(self._rng(i) for i in range(self.num_envs))
+
+    @property
+    def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
+        """The seed of each game's random generator."""
+        return tuple(self._seeds[i] for i in range(self.num_envs) if self._rng(i) is not None)
+
+    def _rng(self, index: int) -> np.random.Generator:
+        rng = self._rngs[index]
+        if rng is None:
+            rng, self._seeds[index] = seeding.np_random()
+            self._rngs[index] = rng
+        return rng
+
+    # -- inside -------------------------------------------------------------------------------------------------------
+
+    def _read(self, value: Any, known: dict[int, PackedKitchen] | None) -> PackedKitchen:
+        """Read and check a kitchen; one object given for many games is read once."""
+        if known is not None and id(value) in known:
+            return known[id(value)]
+        packed = self.settings.pack(read_layout(value, self.settings.shape))
+        if known is not None:
+            known[id(value)] = packed
+        return packed
+
+    def _read_seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
+        if seed is None:
+            return [None] * self.num_envs
+        if isinstance(seed, int | np.integer):
+            return [int(seed) + i for i in range(self.num_envs)]
+        if len(seed) != self.num_envs:
+            raise ValueError(f"expected a seed for each of {self.num_envs} games, got {len(seed)}")
+        return list(seed)
+
+    def _read_mask(self, asked: Any) -> npt.NDArray[np.bool_]:
+        if "reset_mask" not in asked:
+            return np.ones(self.num_envs, dtype=np.bool_)
+        mask = asked["reset_mask"]
+        if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
+            raise ValueError(f"`reset_mask` must be a bool array of shape ({self.num_envs},), got {mask!r}")
+        if not mask.any():
+            raise ValueError("`reset_mask` must mark at least one game")
+        return mask.copy()
+
+    def _read_actions(self, actions: Any) -> npt.NDArray[np.int64]:
+        moves = np.asarray(actions)
+        if moves.shape != (self.num_envs,) or moves.dtype.kind not in "iu":
+            raise ValueError(f"expected {self.num_envs} integer actions, got shape {moves.shape} of {moves.dtype}")
+        if moves.min() < 0 or moves.max() >= NUM_ACTIONS:
+            raise ValueError(f"expected actions 0..{NUM_ACTIONS - 1}, got {moves}")
+        return moves.astype(np.int64).reshape(-1, 1)
+
+    def _check_begun(self) -> None:
+        if not self._begun:
+            raise ResetNeeded("Cannot call envs.step() before calling envs.reset()")
+        if self.autoreset_mode == AutoresetMode.DISABLED and self._done.any():
+            raise ResetNeeded(
+                f"games {np.flatnonzero(self._done).tolist()} are over and autoreset is disabled: reset them with "
+                "envs.reset(options={'reset_mask': mask})"
+            )
+
+    def _enter_next(self, index: int) -> None:
+        """Put one game into the kitchen of its next episode."""
+        packed = self._chosen[index]
+        if packed is None:
+            layout = self.settings.layout
+            if layout is None:
+                assert self.settings.distribution is not None
+                layout = self.settings.distribution.sample(self._rng(index))
+            if layout is self._packed[index].layout:
+                return
+            packed = self.settings.pack(layout)
+        if packed is self._packed[index]:
+            return
+        self._make_room(count_pots(packed.layout))
+        self._packed[index] = packed
+        self._ids[index] = packed.layout.layout_id
+        self._kitchens[index] = packed.kitchen
+        self._routes[index] = packed.routes
+
+    def _make_room(self, num_pots: int) -> None:
+        """Let every state have room for so many pots."""
+        if num_pots <= self._num_pots:
+            return
+        self._num_pots = num_pots
+        self._rules = pack_rules(self.settings.rules, self.settings.shape, 1, num_pots)
+        states = np.full((self.num_envs, int(self._rules[STATE_SIZE])), -1, dtype=np.int32)
+        states[:, : self._states.shape[1]] = self._states
+        self._states = states
+
+    def _restart(self, which: npt.NDArray[np.bool_], masks: npt.NDArray[np.int8] | None = None) -> npt.NDArray[np.int8]:
+        """Start new episodes in some games; returns the action masks with theirs written."""
+        if masks is None:
+            masks = np.zeros((self.num_envs, NUM_ACTIONS), dtype=np.int8)
+        for i in np.flatnonzero(which):
+            self._enter_next(int(i))
+            batch.begin(self._states[i], self._kitchens[i], self._rules, self._goals[i], masks[i])
+        return masks
+
+    def _observe(self) -> npt.NDArray[Any]:
+        obs_type = self.settings.obs_type
+        if obs_type == "grid":
+            grids = np.zeros(self._observations_shape, dtype=np.uint8)
+            batch.grid_observations(self._states, self._kitchens, self._rules, grids)
+            return grids
+        if obs_type == "vector":
+            features = np.zeros(self._observations_shape, dtype=np.float32)
+            batch.vector_observations(self._states, self._kitchens, self._rules, self._routes, features)
+            return features
+        return np.stack([draw_small(self.view(i)) for i in range(self.num_envs)])
+
+    def _infos(self, masks: npt.NDArray[np.int8], which: npt.NDArray[np.bool_] | None = None) -> Infos:
+        """The games' infos as ``SyncVectorEnv`` gathers them; zeros (None) in games that have none."""
+        height, width = self.settings.shape
+        values: Infos = {
+            "valid_goals": self._goals.reshape(-1, height, width).copy(),
+            "action_mask": masks,
+            "layout_id": self._ids.copy(),
+            "deliveries": self._states[:, DELIVERIES].astype(np.int64),
+            "crossings": self._states[:, CROSSINGS].astype(np.int64),
+        }
+        everyone = which is None or bool(which.all())
+        infos: Infos = {}
+        for key, value in values.items():
+            if not everyone:
+                value = value.copy()
+                value[~which] = None if value.dtype == object else 0  # type: ignore[operator]
+            infos[key] = value
+            infos[f"_{key}"] = np.ones(self.num_envs, dtype=np.bool_) if which is None else which.copy()
+        return infos
+
+    def _finish(self, done: npt.NDArray[np.bool_], masks: npt.NDArray[np.int8]) -> Infos:
+        """What a game that is over and started anew in the same step leaves behind."""
+        observations = self._observe()
+        final = np.full(self.num_envs, None, dtype=object)
+        for i in np.flatnonzero(done):
+            final[i] = observations[i].copy()
+        return {
+            "final_obs": final,
+            "_final_obs": done.copy(),
+            "final_info": self._infos(masks, done),
+            "_final_info": done.copy(),
+        }
+
+
+class _Game:
+    """One game of a batch, with the attributes of an ``OvercookedEnv``."""
+
+    def __init__(self, envs: OvercookedVectorEnv, index: int) -> None:
+        self._envs = envs
+        self._index = index
+
+    @property
+    def layout(self) -> OvercookedLayout:
+        packed = self._envs._chosen[self._index] or self._envs._packed[self._index]
+        return packed.layout
+
+    @property
+    def np_random(self) -> np.random.Generator:
+        return self._envs._rng(self._index)
+
+    @property
+    def np_random_seed(self) -> int:
+        self._envs._rng(self._index)
+        return self._envs._seeds[self._index]
+
+    @property
+    def action_space(self) -> Any:
+        return self._envs.single_action_space
+
+    @property
+    def observation_space(self) -> Any:
+        return self._envs.single_observation_space
+
+    def view(self) -> GameView:
+        return self._envs.view(self._index)
+
+    def arrays(self) -> tuple[Vector, Kitchen, Vector]:
+        return self._envs._states[self._index], self._envs._kitchens[self._index], self._envs._rules
+
+    def valid_goal_names(self) -> tuple[str, ...]:
+        return name_goals(self._envs._packed[self._index].layout, self._envs._goals[self._index])
+
+    def render(self) -> Any:
+        frames = self._envs.render()
+        return None if frames is None else frames[self._index]
+
+    def __getattr__(self, name: str) -> Any:
+        if name in ("settings", "render_mode", "metadata", "get_keys_to_action"):
+            return getattr(self._envs if name != "get_keys_to_action" else OvercookedEnv, name)
+        raise AttributeError(f"the games of a batch have no attribute {name!r}")
