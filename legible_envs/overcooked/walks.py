@@ -142,7 +142,7 @@ def trajectories(
             found.append(
                 Trajectory(
                     states=np.array([*walk.cells, layout.stations[walk.goal]]),
-                    times=seconds[list(walk.ticks)],
+                    times=np.asarray(seconds, dtype=np.float64)[list(walk.ticks)],
                     start=walk.start,
                     goal=walk.goal,
                     candidates=candidates,

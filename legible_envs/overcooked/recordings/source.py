@@ -35,6 +35,7 @@ MEMBERS: Final = {
 }
 """Name and size in bytes of the two tables inside the archive."""
 
+_TIMEOUT: Final = 15.0
 _OFFLINE: Final = f"Get {FILE_NAME} on a machine with access, and give it with `legible humans fetch --from FILE`."
 
 Progress = Callable[[str, int, int], None]
@@ -59,7 +60,7 @@ class PipSettings:
     trusted_hosts: tuple[str, ...] = ()
     cert: str | None = None
     proxy: str | None = None
-    timeout: float = 15.0
+    timeout: float = _TIMEOUT
 
     @classmethod
     def from_pip(cls) -> PipSettings:
@@ -74,7 +75,7 @@ class PipSettings:
         try:
             timeout = float(found.get("timeout", found.get("default-timeout", "")))
         except ValueError:
-            timeout = cls.timeout
+            timeout = _TIMEOUT
         return cls(
             index_urls=() if no_index else main + words("extra-index-url"),
             find_links=words("find-links"),

@@ -38,6 +38,8 @@ class _Record:
     """Remembers its arguments and its state, and does nothing."""
 
     __slots__ = ("args", "state")
+    args: tuple[Any, ...]
+    state: Any
 
     def __new__(cls, *args: Any) -> _Record:
         record = super().__new__(cls)

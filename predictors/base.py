@@ -1,0 +1,268 @@
+"""What every predictor of goals can do, in the way of scikit-learn.
+
+A sample is a :class:`~legible_envs.rollouts.Trajectory` (a complete one, or a prefix of one); the columns of
+probabilities are ``classes_``, and each row is zero outside the trajectory's own candidates.
+
+To write a predictor, subclass :class:`GoalPredictor`, take parameters in ``__init__`` and store them unchanged, and
+define ``predict_proba``; define ``fit`` if something is learned (call ``super().fit(X)``, which learns ``classes_``).
+:func:`predictors.registry.check_predictor` tells what a predictor gets wrong.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import Any, Final, Literal, Self
+
+import numpy as np
+import numpy.typing as npt
+from sklearn.base import BaseEstimator
+from sklearn.exceptions import NotFittedError
+
+from legible_envs.rollouts import Cut, Trajectory
+
+__all__ = ["FRACTIONS", "TIE_TOLERANCE", "GoalPredictor", "GoalStream", "Ties", "correctness"]
+
+Ties = Literal["fractional", "strict"]
+
+FRACTIONS: Final = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
+"""Fractions observed at which predictors are judged unless told otherwise."""
+
+TIE_TOLERANCE: Final = 1e-9
+"""Probabilities that differ by no more are a tie."""
+
+
+class GoalPredictor(BaseEstimator, ABC):
+    """Base class of predictors.
+
+    Attributes:
+        classes_: ``(K,)`` names of all goals and candidates seen in ``fit``, sorted.
+    """
+
+    classes_: npt.NDArray[np.str_]
+
+    def fit(self, X: Sequence[Trajectory], y: object = None) -> Self:
+        """Learn from complete trajectories.
+
+        Args:
+            X: Trajectories.
+            y: Ignored; goals are part of the trajectories.
+
+        Raises:
+            ValueError: No trajectories.
+            TypeError: Something else than trajectories.
+        """
+        walks = self._check_trajectories(X)
+        if not walks:
+            raise ValueError(f"{type(self).__name__}.fit needs at least one trajectory, got none")
+        self.classes_ = np.array(sorted({name for walk in walks for name in walk.candidates}))
+        return self
+
+    @abstractmethod
+    def predict_proba(self, X: Sequence[Trajectory]) -> npt.NDArray[np.float64]:
+        """Probability of each goal, given all states of each trajectory.
+
+        Args:
+            X: ``n`` trajectories or prefixes; an empty prefix asks for the prior.
+
+        Returns:
+            ``(n, K)``, rows summing to one, columns as in ``classes_``, zero for goals that are not candidates.
+
+        Raises:
+            ValueError: A candidate that was never seen in ``fit``, or states the predictor cannot read.
+            NotFittedError: Before ``fit``.
+        """
+
+    def predict_proba_at(
+        self, X: Sequence[Trajectory], fractions: Sequence[float] = FRACTIONS, cut: Cut = "steps"
+    ) -> npt.NDArray[np.float64]:
+        """Probabilities when only a fraction of each trajectory is observed.
+
+        Args:
+            X: ``n`` complete trajectories.
+            fractions: ``F`` fractions.
+            cut: Fraction of what; see :data:`legible_envs.rollouts.CUTS`.
+
+        Returns:
+            ``(n, F, K)``.
+        """
+        walks = self._check_trajectories(X)
+        # Neighbouring fractions of short walks are the same prefix: ask once for each.
+        lengths = [[walk.prefix_length(fraction, cut) for fraction in fractions] for walk in walks]
+        keys = sorted({(i, length) for i, row in enumerate(lengths) for length in row})
+        row_of = {key: row for row, key in enumerate(keys)}
+        probabilities = self.predict_proba([walks[i].first(length) for i, length in keys])
+        rows = np.array([[row_of[i, length] for length in row] for i, row in enumerate(lengths)], dtype=np.intp)
+        return probabilities[rows.reshape(len(walks), len(fractions))]
+
+    def predict(self, X: Sequence[Trajectory]) -> npt.NDArray[np.str_]:
+        """The most probable goal of each trajectory; among tied ones the first in ``classes_``.
+
+        Do not judge predictors by these labels: :meth:`score` shares ties out instead.
+        """
+        probabilities = self.predict_proba(X)
+        best = probabilities.max(axis=1, keepdims=True, initial=0.0)
+        return self.classes_[(probabilities >= best - TIE_TOLERANCE).argmax(axis=1)]
+
+    def score(
+        self,
+        X: Sequence[Trajectory],
+        y: object = None,
+        *,
+        fractions: Sequence[float] = FRACTIONS,
+        cut: Cut = "steps",
+        ties: Ties = "fractional",
+    ) -> float:
+        """Mean accuracy over trajectories and fractions observed.
+
+        Args:
+            X: Trajectories with known goals. Prefixes are judged as they are, complete ones at ``fractions``.
+            y: Ignored; goals are part of the trajectories.
+            fractions: Fractions observed.
+            cut: Fraction of what; see :data:`legible_envs.rollouts.CUTS`.
+            ties: ``"fractional"``: a goal among ``k`` tied ones counts 1/k. ``"strict"``: it counts nothing.
+        """
+        walks = self._check_trajectories(X)
+        if not walks:
+            raise ValueError("no trajectories to score")
+        whole = [walk for walk in walks if walk.complete]
+        parts = [walk for walk in walks if not walk.complete]
+        if whole and parts:
+            raise ValueError(f"give complete trajectories or prefixes, not both ({len(whole)} and {len(parts)})")
+        if parts:
+            return float(correctness(self.predict_proba(parts), self.goal_columns(parts), ties).mean())
+        return float(correctness(self.predict_proba_at(whole, fractions, cut), self.goal_columns(whole), ties).mean())
+
+    def stream(self, context: Trajectory) -> GoalStream:
+        """Watch one person as they move.
+
+        Args:
+            context: What is known beforehand: start, candidates, layout. Its states are not looked at.
+
+        Returns:
+            A stream; ``stream.update(point)`` returns ``{goal: probability}`` and equals :meth:`predict_proba` of the
+            same prefix.
+        """
+        return GoalStream(self, context)
+
+    def goal_columns(self, walks: Sequence[Trajectory]) -> npt.NDArray[np.intp]:
+        """``(n,)`` column of each trajectory's goal in ``classes_``.
+
+        Raises:
+            ValueError: A trajectory without a known goal, or candidates that were never seen in ``fit``.
+        """
+        columns = []
+        for number, walk in enumerate(walks):
+            if walk.goal is None:
+                raise ValueError(f"trajectory {number} has no known goal to judge by")
+            columns.append(self._columns(walk)[walk.candidates.index(walk.goal)])
+        return np.array(columns, dtype=np.intp)
+
+    # -- for subclasses ---------------------------------------------------------------------------------------------
+
+    @staticmethod
+    def _check_trajectories(X: Sequence[Trajectory]) -> list[Trajectory]:
+        if isinstance(X, Trajectory):
+            raise TypeError("expected a list of trajectories, got a single one; put it in a list")
+        walks = list(X)
+        for number, walk in enumerate(walks):
+            if not isinstance(walk, Trajectory):
+                raise TypeError(f"expected trajectories, got {type(walk).__name__} at index {number}")
+        return walks
+
+    def _columns(self, walk: Trajectory) -> npt.NDArray[np.intp]:
+        """Columns of a trajectory's candidates, in their order."""
+        if not hasattr(self, "classes_"):
+            raise NotFittedError(f"this {type(self).__name__} is not fitted yet; call `fit` with trajectories first")
+        columns = np.searchsorted(self.classes_, walk.candidates)
+        known = self.classes_[np.minimum(columns, len(self.classes_) - 1)] == np.array(walk.candidates)
+        if not known.all():
+            unknown = [name for name, is_known in zip(walk.candidates, known, strict=True) if not is_known]
+            raise ValueError(f"unknown goals {unknown}; `fit` saw {self.classes_.tolist()}")
+        return columns
+
+
+def correctness(
+    probabilities: npt.NDArray[np.float64], goals: npt.NDArray[np.integer], ties: Ties = "fractional"
+) -> npt.NDArray[np.float64]:
+    """How right predictions are, 0 to 1.
+
+    Args:
+        probabilities: ``(n, K)`` or ``(n, F, K)``.
+        goals: ``(n,)`` column of each true goal.
+        ties: ``"fractional"``: the true goal among ``k`` at the top counts 1/k (the expected accuracy of picking one
+            of them at random). ``"strict"``: only the single top counts.
+
+    Returns:
+        ``(n,)`` or ``(n, F)``.
+    """
+    if ties not in ("fractional", "strict"):
+        raise ValueError(f"`ties` must be 'fractional' or 'strict', got {ties!r}")
+    top = probabilities >= probabilities.max(axis=-1, keepdims=True) - TIE_TOLERANCE
+    index = np.asarray(goals).reshape(-1, *(1,) * (probabilities.ndim - 1))
+    is_top = np.take_along_axis(top, index, axis=-1)[..., 0]
+    sharing = top.sum(axis=-1)
+    return np.where(is_top, 1.0 / sharing, 0.0) if ties == "fractional" else np.where(is_top & (sharing == 1), 1.0, 0.0)
+
+
+class GoalStream:
+    """A predictor's belief about one person, updated as they move; made by :meth:`GoalPredictor.stream`."""
+
+    def __init__(self, predictor: GoalPredictor, context: Trajectory) -> None:
+        self._predictor = predictor
+        self._context = context.first(0)
+        self._columns = predictor._columns(context)
+        self._points: list[tuple[Any, ...]] = []
+        self._times: list[float] = []
+
+    @property
+    def belief(self) -> dict[str, float]:
+        """``{goal: probability}`` now; the prior before the first point."""
+        row = self._predictor.predict_proba([self._observed()])[0]
+        return dict(zip(self._context.candidates, row[self._columns].tolist(), strict=True))
+
+    def update(self, point: npt.ArrayLike, time: float | None = None) -> dict[str, float]:
+        """Add a state and return the belief.
+
+        Args:
+            point: ``(d,)`` cell or position. Standing still on a cell of a grid adds nothing.
+            time: When, in seconds; one after the other without it.
+
+        Raises:
+            ValueError: Not a point, NaN, another dimension than before, or a time that runs backwards.
+        """
+        self.add(point, time)
+        return self.belief
+
+    def add(self, point: npt.ArrayLike, time: float | None = None) -> None:
+        """Add a state without asking for the belief; see :meth:`update`."""
+        array = np.asarray(point)
+        if array.ndim != 1 or not np.issubdtype(array.dtype, np.number) or not np.isfinite(array).all():
+            raise ValueError(f"expected one finite point of shape (d,), got {point!r}")
+        if self._points and len(self._points[-1]) != len(array):
+            raise ValueError(f"expected a point of dimension {len(self._points[-1])} as before, got {len(array)}")
+        when = (self._times[-1] + 1.0 if self._times else 0.0) if time is None else float(time)
+        if self._times and not when >= self._times[-1]:
+            raise ValueError(f"time runs backwards: {when} after {self._times[-1]}")
+        value = tuple(array.tolist())
+        if np.issubdtype(array.dtype, np.integer) and self._points and self._points[-1] == value:
+            return
+        self._points.append(value)
+        self._times.append(when)
+
+    def _observed(self) -> Trajectory:
+        if not self._points:
+            return self._context
+        part = self._context
+        return Trajectory(
+            states=np.array(self._points),
+            times=np.array(self._times),
+            start=part.start,
+            candidates=part.candidates,
+            participant=part.participant,
+            condition=part.condition,
+            layout=part.layout,
+            layout_name=part.layout_name,
+            candidate_set=part.candidate_set,
+            complete=False,
+        )

@@ -1,0 +1,1 @@
+"""Predictors of walks between stations of a kitchen."""

@@ -1,0 +1,70 @@
+"""The heuristic that a person reaches for what is nearest."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from legible_envs.rollouts import Trajectory
+from predictors.base import TIE_TOLERANCE
+from predictors.grid.distances import GridPredictor, check_walk, remaining_steps
+
+__all__ = ["ShortestDistance"]
+
+Metric = Literal["manhattan", "geodesic"]
+
+
+class ShortestDistance(GridPredictor):
+    r"""Predicts the candidate nearest to where the person is now; equally near ones share the probability.
+
+    The baseline of Tung et al. (HRI 2024). It knows neither the start nor the way so far. With nothing observed yet
+    all candidates are equally probable.
+
+    Args:
+        metric: ``"manhattan"``: rows plus columns to the station, through walls. ``"geodesic"``: steps of the shortest
+            way into the station.
+
+    Attributes:
+        classes_: ``(K,)`` names of all goals and candidates seen in ``fit``, sorted.
+
+    Example:
+        >>> from legible_envs.overcooked import OvercookedLayout
+        >>> from legible_envs.rollouts import Trajectory
+        >>> kitchen = OvercookedLayout.from_ascii("XOXXXTX\nX     X\nXXXSXXX")
+        >>> walk = Trajectory([(1, 3), (1, 2)], goal="onion", candidates=("onion", "tomato"), layout=kitchen)
+        >>> ShortestDistance().fit([walk]).predict_proba([walk.first(1), walk]).tolist()
+        [[0.5, 0.5], [1.0, 0.0]]
+    """
+
+    def __init__(self, metric: Metric = "manhattan") -> None:
+        self.metric = metric
+
+    def candidate_probabilities(self, walk: Trajectory) -> npt.NDArray[np.float64]:
+        """``(len(walk.candidates),)`` probabilities in the order of the walk's candidates.
+
+        Raises:
+            ValueError: An unknown metric, or a walk that does not fit its layout.
+        """
+        if self.metric not in ("manhattan", "geodesic"):
+            raise ValueError(f"`metric` must be 'manhattan' or 'geodesic', got {self.metric!r}")
+        layout = check_walk(walk)
+        count = len(walk.candidates)
+        if not walk.num_states:
+            return np.full(count, 1.0 / count)
+        row, col = walk.states[-1].tolist()
+        if self.metric == "geodesic":
+            distances = remaining_steps(layout, walk.candidates)[row, col]
+        else:
+            missing = [goal for goal in walk.candidates if goal not in layout.stations]
+            if missing:
+                raise ValueError(
+                    f"the candidates {missing} are no stations of the layout, which has {list(layout.stations)}"
+                )
+            stations = np.array([layout.stations[goal] for goal in walk.candidates])
+            distances = np.abs(stations - (row, col)).sum(axis=1).astype(np.float64)
+        if np.isinf(distances).all():
+            raise ValueError(f"no candidate of {walk.candidates} can be reached from row {row}, column {col}")
+        nearest = distances <= distances.min() + TIE_TOLERANCE
+        return nearest / nearest.sum()
