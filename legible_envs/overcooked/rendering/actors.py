@@ -91,10 +91,12 @@ def _hat(canvas: Canvas, colour: str, x: float, y: float) -> None:
 
 
 def _hands(canvas: Canvas, facing: int, held: Item | None) -> None:
-    x, y = {NORTH: (0.77, 0.84), SOUTH: (0.5, 1.0), EAST: (0.74, 0.92), WEST: (0.26, 0.92)}[facing]
+    x, y = {NORTH: (0.78, 0.86), SOUTH: (0.5, 1.0), EAST: (0.74, 0.92), WEST: (0.26, 0.92)}[facing]
     if held is None:
-        spread = {NORTH: 0.24, SOUTH: 0.24}.get(facing, 0.0)
-        hands = [(x - spread, 0.95), (x + spread, 0.95)] if spread else [(x - (0.5 - x) * 0.12, 0.94)]
+        if facing in (NORTH, SOUTH):
+            hands = [(0.26, 0.95), (0.74, 0.95)]
+        else:
+            hands = [(x - (0.5 - x) * 0.12, 0.94)]
     else:
         draw_item(canvas, held, x, y, 0.185 if held.kind in ("dish", "soup") else 0.165)
         hands = [(x - 0.19, y + 0.06), (x + 0.19, y + 0.06)]

@@ -24,6 +24,7 @@ __all__ = ["board_of", "draw_game", "draw_layout", "paste_label"]
 
 _POT: Final = STATION_CODES["pot"]
 _SERVING: Final = STATION_CODES["serving"]
+_EMPTY: Final = PotView()
 _AROUND: Final = ((-1, 0), (0, 1), (1, 0), (0, -1), (-1, 1), (1, 1), (1, -1), (-1, -1))
 
 
@@ -80,8 +81,7 @@ def draw_game(view: GameView, *, tile: int = 48, hud: bool = True) -> Image:
     image = np.empty((above + height * tile, width * tile, 3), np.uint8)
     board = image[above:]
     board[...] = _background(view.layout, tile)
-    for (row, col), pot in view.pots.items():
-        paste(board, pot_sprite(pot, tile), row * tile, col * tile)
+    _paste_pots(board, view.layout, view.pots, tile)
     for (row, col), item in view.counters.items():
         paste(board, item_sprite(item, tile), row * tile, col * tile)
     for player in sorted(range(len(view.players)), key=lambda p: view.players[p].cell):  # nearer ones in front
@@ -96,7 +96,14 @@ def draw_game(view: GameView, *, tile: int = 48, hud: bool = True) -> Image:
 
 def board_of(layout: OvercookedLayout, tile: int) -> Image:
     """The bare kitchen as a new array to draw on."""
-    return _background(layout, tile).copy()
+    image = _background(layout, tile).copy()
+    _paste_pots(image, layout, {}, tile)
+    return image
+
+
+def _paste_pots(image: Image, layout: OvercookedLayout, pots: Mapping[Cell, PotView], tile: int) -> None:
+    for row, col in np.argwhere(layout.cells == _POT).tolist():
+        paste(image, pot_sprite(pots.get((row, col), _EMPTY), tile), row * tile, col * tile)
 
 
 def paste_label(image: Image, layout: OvercookedLayout, cell: Cell, text: str, tile: int) -> None:
@@ -143,7 +150,7 @@ def _start_sprite(player: int, tile: int) -> Sprite:
 
 
 class _Backgrounds:
-    """The last few kitchens drawn, up to a number of bytes: a game draws the same one thousands of times."""
+    """The last few kitchens drawn, stoves without pots, up to a number of bytes; a game draws one many times."""
 
     def __init__(self, room: int) -> None:
         self._room, self._held = room, 0
@@ -193,8 +200,7 @@ def _cell_sprites(layout: OvercookedLayout, cell: Cell, tile: int) -> Sequence[S
         return floor, tile_sprite(OBSTACLE, int(near), False, 0, tile)
     front = int(not _is_solid(layout, (row + 1, col)))
     away = _away(layout, cell) if code == _SERVING else 0
-    counter = tile_sprite(code, front, odd, away, tile)
-    return (counter, pot_sprite(PotView(), tile)) if code == _POT else (counter,)
+    return (tile_sprite(code, front, odd, away, tile),)
 
 
 def _code(layout: OvercookedLayout, cell: Cell) -> int:

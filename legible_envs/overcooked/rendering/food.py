@@ -116,10 +116,12 @@ def draw_pieces(canvas: Canvas, contents: Sequence[str], x: float, y: float, rad
     if count == 1:
         draw_ingredient(canvas, contents[0], x, y, radius * 0.62)
         return
-    each = radius * {2: 0.46, 3: 0.42, 4: 0.37}.get(count, 1.5 / count)
+    each = radius * ({2: 0.46, 3: 0.42, 4: 0.37}.get(count) or 0.82 / math.sqrt(count))
     for number, kind in enumerate(contents):
-        angle = 2 * math.pi * (number / count - (0.25 if count > 2 else 0.5))
-        around = radius - each * 1.12
+        if count <= 4:  # a ring, the first on top or to the left
+            angle, around = 2 * math.pi * (number / count - (0.25 if count > 2 else 0.5)), radius - each * 1.12
+        else:  # the pattern of a sunflower's seeds fits any number
+            angle, around = number * math.pi * (3 - math.sqrt(5)), (radius - each) * math.sqrt((number + 0.5) / count)
         draw_ingredient(canvas, kind, x + around * math.cos(angle), y + around * math.sin(angle), each)
 
 

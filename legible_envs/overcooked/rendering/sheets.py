@@ -13,7 +13,7 @@ import numpy.typing as npt
 from legible_envs.overcooked.rendering.canvas import Image, Sprite, paste, rgb, text_sprite
 from legible_envs.overcooked.rendering.palette import PALETTE
 
-__all__ = ["banner", "check_tile", "draw_side_by_side", "fit_text", "save_png"]
+__all__ = ["banner", "check_tile", "draw_side_by_side", "fit_text", "overlay", "save_png"]
 
 
 def check_tile(tile: int) -> int:
@@ -47,6 +47,26 @@ def banner(image: Image, title: str, tile: int) -> Image:
     framed[above:] = image
     paste(framed, words, (above - words.colour.shape[0]) // 2 + 1, (image.shape[1] - words.colour.shape[1]) // 2)
     return framed
+
+
+def overlay(image: Image, lines: Sequence[str], tile: int) -> Image:
+    """A dimmed copy of the image with lines of text on a card in its middle, the first one larger."""
+    dimmed = (image.astype(np.uint16) * 2 // 5).astype(np.uint8)
+    size = max(14, min(34, round(tile * 0.6)))
+    room = image.shape[1] - size
+    words = [
+        fit_text(line, size if number == 0 else round(size * 0.72), PALETTE["ink" if number == 0 else "ink_soft"], room)
+        for number, line in enumerate(lines)
+    ]
+    tall = sum(len(line.colour) for line in words) + size
+    top = max(0, (image.shape[0] - tall) // 2)
+    left = max(0, (room - max(line.colour.shape[1] for line in words)) // 2)
+    dimmed[top : top + tall, left : image.shape[1] - left] = rgb(PALETTE["page"])
+    row = top + size // 2
+    for line in words:
+        paste(dimmed, line, row, (image.shape[1] - line.colour.shape[1]) // 2)
+        row += len(line.colour)
+    return dimmed
 
 
 def draw_side_by_side(

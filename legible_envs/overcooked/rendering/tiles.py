@@ -144,7 +144,7 @@ def _serving(canvas: Canvas, out: int) -> None:
         x, y = 0.5 + dx * (ahead + 0.06), 0.405 + dy * ahead * 0.88
         wing = [(x - dx * 0.1 + side * dy * 0.24, y - dy * 0.1 + side * dx * 0.24) for side in (-1, 1)]
         canvas.stroke([wing[0], (x, y), wing[1]], 0.055, "#e6fbf0", 0.75)
-    _cloche(canvas, 0.5 - dx * 0.13, 0.53 - dy * (0.13 if dy < 0 else 0.2))
+    _cloche(canvas, 0.5 - dx * 0.13, 0.53 - dy * 0.14)
 
 
 def _cloche(canvas: Canvas, x: float, y: float) -> None:
