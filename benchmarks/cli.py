@@ -192,7 +192,7 @@ def fetch(source: Path | None, out: Path | None) -> None:
     """Fetch the published games once and convert them; nothing in the download is executed."""
     from legible_envs.overcooked.recordings import fetch_recordings
 
-    click.echo(f"recordings: {fetch_recordings(source=source, out=out)}")
+    click.echo(f"recordings: {fetch_recordings(out, source=source)}")
 
 
 @humans.command()

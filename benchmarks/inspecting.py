@@ -108,6 +108,6 @@ def trajectory_table(kitchen: Kitchen, trajectories: Path) -> Table:
     rows = []
     for name, predictor in (("shortest distance", ShortestDistance()), ("Eq. 1", BayesianGoalPredictor())):
         predictor.fit(walks)
-        scores = [predictor.score(walks, fraction=fraction) for fraction in fractions]
+        scores = [predictor.score(walks, fractions=(fraction,)) for fraction in fractions]
         rows.append({"predictor": name, **{f"{f:.0%}": s for f, s in zip(fractions, scores, strict=True)}})
     return table(rows, title=f"{len(walks):,} walks: goals read correctly, by share of the walk observed")

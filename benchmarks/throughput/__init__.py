@@ -1,0 +1,1 @@
+"""``legible bench``: how fast things are, as ratios within one run. See :mod:`benchmarks.throughput.sweep`."""

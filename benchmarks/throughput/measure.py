@@ -1,0 +1,60 @@
+"""Measuring: samples that take turns, so that a machine's moods hit all of them alike."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+__all__ = ["Figure", "alternate", "rate"]
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One measured quantity.
+
+    Attributes:
+        key: Its name in :data:`benchmarks.throughput.sweep.TARGETS`, or any other.
+        what: What it is, for people.
+        unit: ``"/s"``, ``"s"``, ``"x"`` (a ratio) or ``"share"``.
+        samples: All measured values; the median is reported.
+    """
+
+    key: str
+    what: str
+    unit: str
+    samples: tuple[float, ...]
+
+    @property
+    def value(self) -> float:
+        """Median of the samples."""
+        return statistics.median(self.samples)
+
+    def over(self, other: Figure, key: str, what: str) -> Figure:
+        """This quantity over another one measured in turn with it: the ratios of their paired samples."""
+        return Figure(key, what, "x", tuple(a / b for a, b in zip(self.samples, other.samples, strict=True)))
+
+
+def rate(work: Callable[[], int], seconds: float) -> float:
+    """How many units per second ``work`` does, which returns how many one call did.
+
+    It is called until at least ``seconds`` have passed.
+    """
+    done, start = 0, time.perf_counter()
+    while True:
+        done += work()
+        passed = time.perf_counter() - start
+        if passed >= seconds:
+            return done / passed
+
+
+def alternate(samplers: Mapping[str, Callable[[], float]], rounds: int) -> dict[str, tuple[float, ...]]:
+    """Take one sample of each in turn, ``rounds`` times, after one unrecorded round that warms up."""
+    samples: dict[str, list[float]] = {name: [] for name in samplers}
+    for number in range(rounds + 1):
+        for name, sampler in samplers.items():
+            value = sampler()
+            if number:
+                samples[name].append(value)
+    return {name: tuple(values) for name, values in samples.items()}

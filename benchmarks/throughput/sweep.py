@@ -1,0 +1,73 @@
+"""What the speed benchmark measures, as data: sizes, repeats, and the figures the project promises."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, Literal
+
+__all__ = ["FULL", "OPTIMUM_5X5", "QUICK", "TARGETS", "Settings", "Target"]
+
+OPTIMUM_5X5: Final = -11.684924681147868
+"""Best legibility of all valid 5x5 kitchens with ``prefix="sum"``, known from exhaustive search."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Sizes and repeats.
+
+    Attributes:
+        rounds: How often each figure is measured; all figures of a group take turns, medians are reported.
+        seconds: Duration of one sample of a rate.
+        shapes: Kitchens whose scoring is measured.
+        batch: Layouts scored per call.
+        oracle_layouts: Layouts the readable definition scores per sample.
+        seeds: Searches for the known 5x5 optimum.
+        optimum_evaluations: Budget of each.
+        search_evaluations: Budget of the search whose overhead is measured.
+        num_envs: Size of the vector environment.
+        fresh_starts: New processes for import and compile times.
+    """
+
+    rounds: int = 7
+    seconds: float = 0.5
+    shapes: tuple[tuple[int, int], ...] = ((5, 5), (7, 7), (9, 9))
+    batch: int = 2048
+    oracle_layouts: int = 5
+    seeds: int = 10
+    optimum_evaluations: int = 1_000_000
+    search_evaluations: int = 200_000
+    num_envs: int = 64
+    fresh_starts: int = 5
+
+
+FULL: Final = Settings()
+QUICK: Final = Settings(rounds=3, seconds=0.1, oracle_layouts=1, seeds=2, search_evaluations=50_000, fresh_starts=1)
+
+
+@dataclass(frozen=True)
+class Target:
+    """What a figure should be: at least or at most a value."""
+
+    sense: Literal[">=", "<="]
+    value: float
+
+    def met_by(self, value: float) -> bool:
+        """Whether a measured value reaches the target."""
+        return value >= self.value if self.sense == ">=" else value <= self.value
+
+
+TARGETS: Final[dict[str, Target]] = {
+    "score 5x5": Target(">=", 250_000),
+    "score 7x7": Target(">=", 100_000),
+    "score / oracle": Target(">=", 1_000),
+    "optimum found": Target(">=", 1.0),
+    "optimum seconds": Target("<=", 5.0),
+    "search overhead": Target("<=", 0.35),
+    "env": Target(">=", 100_000),
+    "vector env": Target(">=", 1_500_000),
+    "reset": Target("<=", 100e-6),
+    "env / peer": Target(">=", 10),
+    "vector env / peer": Target(">=", 150),
+    "import": Target("<=", 0.3),
+    "compile": Target("<=", 20.0),
+}
