@@ -177,7 +177,7 @@ class Canvas:
 
 @lru_cache(maxsize=1024)
 def text_sprite(text: str, size: int, colour: str) -> Sprite:
-    """One line of text in pygame's built-in typeface, ``size`` pixels high, trimmed to its ink left and right."""
+    """One line of text in pygame's built-in typeface, about ``size`` pixels high."""
     pygame = load_pygame()
     if not pygame.font.get_init():
         pygame.font.init()

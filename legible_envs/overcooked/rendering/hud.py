@@ -35,22 +35,30 @@ def draw_hud(view: GameView, width: int, tile: int) -> Image:
     pad = max(2, height // 8)
     size = max(11, round(height * 0.5))
     right = width - pad
-    words = [(str(view.steps), f"step {view.steps}", PALETTE["hud_text"])]
+    counts = [("step ", view.steps, PALETTE["hud_text"])]
     if view.crossings:
-        words.append((str(view.crossings), f"crossed {view.crossings}", PALETTE["warning"]))
+        counts.append(("crossed ", view.crossings, PALETTE["warning"]))
     tickets = tickets_of(view)
     needed = pad + len(tickets) * (round(_TICKET * height) + pad)
-    for short, long, colour in words:
-        sprite = text_sprite(long, size, colour)
-        if right - sprite.colour.shape[1] - 2 * pad < needed:
-            sprite = text_sprite(short, size, colour)
-        if right - sprite.colour.shape[1] < pad:
+    for word, count, colour in counts:
+        # Digit by digit: every number would be another text to draw, and a jumpy one to look at.
+        parts = [text_sprite(part, size, colour) for part in (word, *str(count))]
+        if right - _width_of(parts) - 2 * pad < needed:
+            del parts[0]
+        if right - _width_of(parts) < pad:
             break
-        right -= sprite.colour.shape[1]
-        paste(strip, sprite, (height - sprite.colour.shape[0]) // 2 + 1, right)
+        right -= _width_of(parts)
+        left = right
+        for part in parts:
+            paste(strip, part, (height - part.colour.shape[0]) // 2 + 1, left)
+            left += part.colour.shape[1]
         right -= 2 * pad
     _lay_tickets(strip, tickets, pad, right, size)
     return strip
+
+
+def _width_of(parts: list[Sprite]) -> int:
+    return sum(part.colour.shape[1] for part in parts)
 
 
 def tickets_of(view: GameView) -> list[tuple[Recipe, bool]]:
