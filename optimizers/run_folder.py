@@ -20,6 +20,7 @@ import platform
 import subprocess
 import sys
 from collections.abc import Iterable, Mapping
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -147,8 +148,12 @@ def pickle_versions() -> dict[str, str]:
     }
 
 
+@cache
 def git_revision() -> str | None:
-    """Revision of the checkout this package runs from, ``-dirty`` if changed; None outside a checkout."""
+    """Revision of the checkout this package runs from, ``-dirty`` if changed; None outside a checkout.
+
+    Looked up once per process: it is the code as it was loaded that matters.
+    """
     here = Path(__file__)
 
     def git(*arguments: str) -> str:
