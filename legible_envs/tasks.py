@@ -18,13 +18,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from legible_envs.errors import TaskError
+from legible_envs.task_states import StateSpace, SubtaskClass
 
 if TYPE_CHECKING:
     import networkx as nx
 
 __all__ = ["Stage", "Subtask", "TaskGraph", "Transition"]
-
-MAX_STATES = 2_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,20 +97,6 @@ class Transition:
 
 
 @dataclass(frozen=True)
-class _Class:
-    """Interchangeable subtasks: same goals, same places afterwards, same neighbours in the graph."""
-
-    goals: tuple[str, ...]
-    then: tuple[str, ...]
-    count: int
-    predecessors: tuple[int, ...] = ()
-    group: int = -1
-
-
-_State = tuple[tuple[int, ...], str]
-
-
-@dataclass(frozen=True)
 class TaskGraph:
     """A precedence graph of subtasks, and the stages its valid sequences pass through.
 
@@ -151,7 +136,7 @@ class TaskGraph:
         object.__setattr__(self, "max_open", max_open)
         self._check_names()
         self._check_acyclic()
-        if self._completions[self._initial] == 0:
+        if self._space.num_sequences == 0:
             raise TaskError(
                 f"the task has no valid sequence: max_open={max_open} and the precedence contradict each other"
             )
@@ -201,136 +186,49 @@ class TaskGraph:
             cycle = path[path.index(path[-1]) :]
             raise TaskError("the precedence has a cycle: " + " waits for ".join(cycle))
 
-    # -- dynamic programming over task states --------------------------------------------------------------------------
-
     @cached_property
-    def _classes(self) -> tuple[_Class, ...]:
+    def _space(self) -> StateSpace:
+        return StateSpace(self._classes(), self.start, self.max_open)
+
+    def _classes(self) -> list[SubtaskClass]:
         """Merge interchangeable subtasks, so that states count copies instead of naming them."""
-        followers: dict[str, frozenset[str]] = {
-            s.name: frozenset(other.name for other in self.subtasks if s.name in other.after) for s in self.subtasks
-        }
-        group_of = {member: i for i, members in enumerate(self.groups.values()) for member in members}
-        members: dict[object, list[Subtask]] = defaultdict(list)
+        followers: dict[str, set[str]] = {s.name: set() for s in self.subtasks}
         for s in self.subtasks:
-            key = (s.goals, s.then, frozenset(s.after), followers[s.name], group_of.get(s.name, -1))
-            members[key].append(s)
-        index = {s.name: i for i, alike in enumerate(members.values()) for s in alike}
-        return tuple(
-            _Class(
-                goals=alike[0].goals,
-                then=alike[0].then,
-                count=sum(s.count for s in alike),
-                predecessors=tuple(sorted({index[name] for name in alike[0].after})),
-                group=group_of.get(alike[0].name, -1),
-            )
-            for alike in members.values()
-        )
-
-    @property
-    def _initial(self) -> _State:
-        return (0,) * len(self._classes), self.start
-
-    def _ready(self, done: tuple[int, ...]) -> list[int]:
-        """Classes of which a copy may be done next, by precedence and open groups."""
-        classes = self._classes
-        begun, unfinished = set(), set()
-        for cls, n in zip(classes, done, strict=True):
-            if cls.group >= 0:
-                if n > 0:
-                    begun.add(cls.group)
-                if n < cls.count:
-                    unfinished.add(cls.group)
-        is_open = begun & unfinished
-        full = self.max_open is not None and len(is_open) >= self.max_open
+            for before in s.after:
+                followers[before].add(s.name)
+        group_of = {member: i for i, members in enumerate(self.groups.values()) for member in members}
+        alike: dict[object, list[Subtask]] = defaultdict(list)
+        for s in self.subtasks:
+            alike[s.goals, s.then, frozenset(s.after), frozenset(followers[s.name]), group_of.get(s.name)].append(s)
+        index = {s.name: i for i, members in enumerate(alike.values()) for s in members}
         return [
-            i
-            for i, cls in enumerate(classes)
-            if done[i] < cls.count
-            and all(done[p] == classes[p].count for p in cls.predecessors)
-            and not (full and cls.group >= 0 and cls.group not in is_open)
+            SubtaskClass(
+                goals=first.goals,
+                then=first.then,
+                count=sum(s.count for s in members),
+                predecessors=tuple(sorted({index[name] for name in first.after})),
+                group=group_of.get(first.name),
+            )
+            for members in alike.values()
+            for first in members[:1]
         ]
-
-    def _steps(self, state: _State) -> list[tuple[int, str, float, _State]]:
-        """``(class, goal, multiplicity, next state)`` of every possible step; multiplicity counts copies."""
-        done, _ = state
-        steps = []
-        for i in self._ready(done):
-            cls = self._classes[i]
-            after = (*done[:i], done[i] + 1, *done[i + 1 :])
-            for goal in cls.goals:
-                place = cls.then[-1] if cls.then else goal
-                steps.append((i, goal, (cls.count - done[i]) / len(cls.goals), (after, place)))
-        return steps
-
-    @cached_property
-    def _layers(self) -> list[list[_State]]:
-        """All reachable states, by number of finished subtasks."""
-        layers = [[self._initial]]
-        total, seen = sum(cls.count for cls in self._classes), 1
-        for _ in range(total):
-            following = {step[3]: None for state in layers[-1] for step in self._steps(state)}
-            seen += len(following)
-            if seen > MAX_STATES:
-                raise TaskError(
-                    f"the task has more than {MAX_STATES:,} states; merge interchangeable subtasks with `count`"
-                )
-            layers.append(list(following))
-        return layers
-
-    @cached_property
-    def _completions(self) -> dict[_State, int]:
-        """Number of ways to finish the task from each state (copies distinct, goals of one subtask not)."""
-        completions: dict[_State, int] = {}
-        total = sum(cls.count for cls in self._classes)
-        for layer in reversed(self._layers):
-            for state in layer:
-                if sum(state[0]) == total:
-                    completions[state] = 1
-                    continue
-                ways = 0
-                for i in self._ready(state[0]):
-                    # Which goal fulfils the subtask does not change what can follow, so one stands for all.
-                    cls = self._classes[i]
-                    after = (*state[0][:i], state[0][i] + 1, *state[0][i + 1 :])
-                    ways += (cls.count - state[0][i]) * completions[after, cls.then[-1] if cls.then else cls.goals[0]]
-                completions[state] = ways
-        return completions
-
-    @cached_property
-    def _transitions(self) -> tuple[Transition, ...]:
-        completions = self._completions
-        visits: dict[_State, float] = defaultdict(float)
-        visits[self._initial] = 1.0
-        weights: dict[tuple[str, tuple[str, ...], str, tuple[str, ...]], float] = defaultdict(float)
-        for layer in self._layers[:-1]:
-            for state in layer:
-                if not visits[state]:
-                    continue
-                steps = [step for step in self._steps(state) if completions[step[3]]]
-                goals = tuple(sorted({goal for _, goal, _, _ in steps}))
-                for i, goal, copies, following in steps:
-                    # Python ints stay exact however long the task; only the final quotient is a float.
-                    probability = copies * (completions[following] / completions[state])
-                    visits[following] += visits[state] * probability
-                    weights[state[1], goals, goal, self._classes[i].then] += visits[state] * probability
-        return tuple(Transition(*key, weight) for key, weight in sorted(weights.items()))
 
     # -- what users ask ------------------------------------------------------------------------------------------------
 
     @property
     def num_sequences(self) -> int:
         """Exact number of valid sequences."""
-        return self._completions[self._initial]
+        return self._space.num_sequences
 
     @property
     def num_states(self) -> int:
         """Number of task states that lie on some valid sequence: what is done and where the person is."""
-        return sum(1 for ways in self._completions.values() if ways)
+        return self._space.num_states
 
     @property
     def length(self) -> int:
         """Number of subtasks in every valid sequence, copies counted."""
-        return sum(cls.count for cls in self._classes)
+        return sum(s.count for s in self.subtasks)
 
     @property
     def goals(self) -> tuple[str, ...]:
@@ -353,6 +251,10 @@ class TaskGraph:
     def transitions(self) -> tuple[Transition, ...]:
         """All distinct transitions (stage, next goal, places afterwards) with their expected number."""
         return self._transitions
+
+    @cached_property
+    def _transitions(self) -> tuple[Transition, ...]:
+        return tuple(Transition(*key, weight) for key, weight in sorted(self._space.transition_weights().items()))
 
     def legs(self) -> dict[tuple[str, str], float]:
         """Expected number of walks from each place to each other place in a uniformly random valid sequence."""
