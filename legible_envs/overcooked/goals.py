@@ -2,7 +2,8 @@
 
 The goals here are those of the running game (the candidate set ``game``): stations and counters where an INTERACT would
 bring the game forward, as far as the player can get to them. With one pot they are the goals of
-``soup_task(pots=1)``: ingredients that the begun soup can still use, then a dish, then the pot, then serving.
+``soup_task(pots=1)`` (ingredients that the begun soup can still use, then a dish, then the pot, then serving), except
+that the begun soup need not be decided: after an onion everything is valid that some soup with an onion still needs.
 """
 
 from __future__ import annotations

@@ -93,8 +93,12 @@ def _read_array(value: Any, shape: tuple[int, int]) -> OvercookedLayout:
         return OvercookedLayout(array)
     from legible_envs.overcooked.workspace import OvercookedWorkspace
 
-    layout: OvercookedLayout = OvercookedWorkspace(shape=shape).decode(array)
-    return layout
+    try:
+        return OvercookedWorkspace(shape=shape).decode(array)
+    except LayoutError:
+        raise
+    except ValueError as error:
+        raise LayoutError(f"not a genome of kitchens of shape {shape}: {error}", rule="genome") from error
 
 
 class PackedKitchen(NamedTuple):
@@ -208,7 +212,7 @@ class KitchenSettings:
         for number, kind in enumerate(INGREDIENTS):
             most = max(recipe.count(kind) for recipe in self.rules.recipes)
             high[..., GRID_CHANNELS.index("tomatoes") + number] = max(most, 1)
-        high[..., GRID_CHANNELS.index("ticks cooked")] = min(self.rules.cook_time, 255)
+        high[..., GRID_CHANNELS.index("ticks cooked")] = max(min(self.rules.cook_time, 255), 1)
         return spaces.Box(np.zeros_like(high), high, dtype=np.uint8)
 
 

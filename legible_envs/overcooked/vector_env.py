@@ -404,7 +404,7 @@ class OvercookedVectorEnv(JsonSpec, VectorEnv[npt.NDArray[Any], npt.NDArray[Any]
         return {
             "final_obs": final,
             "_final_obs": done.copy(),
-            "final_info": self._infos(masks, done),
+            "final_info": self._infos(masks.copy(), done),
             "_final_info": done.copy(),
         }
 
