@@ -60,7 +60,7 @@ def show_kitchen(console: Console, kitchen: Kitchen, picture: Path | None) -> No
     )
     if len(rows) > len(shown):
         rest = math.fsum(row["contribution"] for row in rows[len(shown) :])
-        console.print(f"… and {len(rows) - len(shown)} more reaches, together {number(rest)}", style="dim")
+        console.print(f"and {len(rows) - len(shown)} more reaches, together {number(rest)}", style="dim")
     console.print()
     console.print(table([_loss_row(row) for row in rows[-3:][::-1]], title="Reaches that win most"))
     if picture is None:

@@ -78,7 +78,7 @@
   const floorValue = values.length > 20 ? values[Math.floor(values.length * 0.9)] : low;
   const shade = (value) => ramp(high > floorValue ? Math.max(0, Math.min(1, (value - floorValue) / (high - floorValue))) : 1);
   const cellWidth = Math.max(7, Math.min(26, 640 / columnAxis.count));
-  const cellHeight = Math.max(6, Math.min(26, 560 / rowAxis.count));
+  const cellHeight = Math.max(6, Math.min(34, 560 / rowAxis.count));
   const isOrder = (label) => [...String(label)].every((symbol) => STATIONS[symbol]);
   const inWords = (label) => isOrder(label) ? [...label].map((symbol) => STATIONS[symbol]).join(" · ") : String(label);
   const longest = Math.max(...columnAxis.labels.map((label) => label.length));
@@ -336,7 +336,7 @@
     const frame = { width: 520, height: 300, left: 48, under: 46 };
     const all = curves.flatMap((curve) => curve.values).filter((v) => v !== null);
     const percent = (v) => number(v * 100, 0) + " %";
-    const { canvas, x, y } = axes(frame, fractions, [Math.min(...all, 0.4), 1], { format: percent, formatX: percent, label: curves.map((curve) => `${curve.label}: ${curve.values.map((v) => number(v, 2)).join(", ")}`).join(". ") });
+    const { canvas, x, y } = axes(frame, fractions, [Math.floor(Math.min(...all, 1) * 10) / 10, Math.ceil(Math.max(...all, 0) * 10) / 10], { format: percent, formatX: percent, label: curves.map((curve) => `${curve.label}: ${curve.values.map((v) => number(v, 2)).join(", ")}`).join(". ") });
     const colours = ["var(--warm)", "var(--accent)", "var(--k-fish)", "var(--k-leaf)", "var(--soft)"];
     const legend = el("p", { class: "about" });
     curves.forEach((curve, i) => {

@@ -37,14 +37,14 @@ class Figure:
 
 
 def rate(work: Callable[[], int], seconds: float) -> float:
-    """How many units per second ``work`` does, which returns how many one call did.
+    """How many units per second of processor time ``work`` does, which returns how many one call did.
 
-    It is called until at least ``seconds`` have passed.
+    It is called until at least ``seconds`` have passed. Time that other processes took does not count.
     """
-    done, start = 0, time.perf_counter()
+    done, start = 0, time.process_time()
     while True:
         done += work()
-        passed = time.perf_counter() - start
+        passed = time.process_time() - start
         if passed >= seconds:
             return done / passed
 

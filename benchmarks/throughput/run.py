@@ -43,7 +43,7 @@ def run_benchmark(
         settings: Sizes and repeats; None means those of ``quick``.
     """
     settings = settings or (QUICK if quick else FULL)
-    remarks: list[str] = []
+    remarks = _busy()
     figures: list[Figure] = []
     with _peer(peers, peers_folder, remarks, console) as peer:
         groups: tuple[tuple[str, Callable[[], list[Figure]]], ...] = (
@@ -63,6 +63,17 @@ def run_benchmark(
         out.write_text(to_markdown(figures, remarks, settings), encoding="utf-8")
         console.print(f"table: {out}")
     return figures
+
+
+def _busy() -> list[str]:
+    """A remark if other processes keep the machine busy, which lengthens every duration."""
+    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
+    cores = os.cpu_count() or 1
+    return (
+        [f"The machine was busy (load {load:.1f} on {cores} cores): durations are too long."]
+        if load > cores / 2
+        else []
+    )
 
 
 class _peer:
