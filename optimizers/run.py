@@ -186,9 +186,10 @@ class Run:
             names = ", ".join(emitter_name(spec) for spec, _ in self.emitters)
             raise EmitterError(f"{names}: ask() proposed nothing although the search is not over")
         scores, measures = self.evaluator(genomes)
-        with warnings.catch_warnings():
-            # pyribs suspects a threshold where nothing was added yet; here no layout had a score.
-            warnings.filterwarnings("ignore", message=".*was empty before adding solutions")
+        with warnings.catch_warnings() if self.state.archive.empty else contextlib.nullcontext():
+            if self.state.archive.empty:
+                # pyribs suspects a threshold where nothing was added yet; here no layout had a score.
+                warnings.filterwarnings("ignore", message=".*was empty before adding solutions")
             self.state.scheduler.tell(scores, measures)
         return genomes
 
@@ -218,12 +219,14 @@ class Run:
             self.save()
 
     def save(self) -> None:
-        """Write a checkpoint and the archive."""
+        """Write a checkpoint, and the archive and best layout so far: a killed run can be looked at."""
         assert self.folder is not None
         header = Header(self._settings, pickle_versions(), self.state.iteration)
         try:
             self._checkpoints.save(header, self.state)
             write_archive(self.folder.archive, self.state.archive)
+            if self.state.archive.best_elite is not None:
+                self.folder.write_best(self.workspace.decode(self.state.archive.best_elite["solution"]))
         except OSError as error:
             raise CheckpointError(
                 f"cannot write to {self.folder.path}: {error}. The last whole checkpoint there is intact: make room "

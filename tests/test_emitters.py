@@ -277,7 +277,7 @@ def test_pyribs_own_emitters_search_integer_layouts(emitter, options):
     adapted = make_emitter(emitter, archive, SHELF, seed=4, options=options)
     assert isinstance(adapted, GenomeAdapter)
     scheduler, evaluate = Scheduler(archive, [adapted]), Evaluator(SHELF, max_distance=6.0)
-    for _ in range(40):
+    for _ in range(12):
         genomes = scheduler.ask()
         assert SHELF.valid(genomes).all()
         assert genomes.dtype == np.int8
