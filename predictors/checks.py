@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Callable, Sequence
+from copy import deepcopy
 
 import numpy as np
 from sklearn.base import clone
@@ -80,7 +81,7 @@ def _check_parameters(predictor: GoalPredictor) -> str | None:
 
 
 def _check_fit(predictor: GoalPredictor, walks: Sequence[Trajectory], fitted: list[GoalPredictor]) -> str | None:
-    copy = clone(predictor)
+    copy = deepcopy(predictor)
     result = copy.fit(walks)
     if result is not copy:
         return f"must return self, returned {type(result).__name__}"

@@ -34,7 +34,7 @@ class Walk(NamedTuple):
         start: Station whose use emptied the hands.
         goal: Station where they were filled again.
         cells: Floor cells in order, consecutive repeats dropped; never empty.
-        ticks: First tick on each of these cells, and the tick of reaching into the goal station.
+        ticks: First tick on each of these cells, and the first tick with full hands.
     """
 
     start: str
@@ -71,7 +71,7 @@ def find_walks(
         elif held[tick] == 0:
             if origin is not None and used is not None and kind in _GOALS:
                 path, ticks = _without_repeats(cells[origin[1] : tick + 1], origin[1])
-                yield Walk(origin[0], used, path, (*ticks, tick))
+                yield Walk(origin[0], used, path, (*ticks, tick + 1))
             origin = None
 
 

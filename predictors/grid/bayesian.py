@@ -67,5 +67,7 @@ class BayesianGoalPredictor(GridPredictor):
             goal = walk.candidates[int(np.isinf(optimal).argmax())]
             raise ValueError(f"the candidate {goal!r} cannot be reached from row {first_row}, column {first_col}")
         excess = steps[row, col] - optimal
-        weights = np.exp(-self.beta * (excess - excess.min()), where=np.isfinite(excess), out=np.zeros(count))
+        possible = np.isfinite(excess)  # nobody inside a station walks on to another
+        weights = np.zeros(count)
+        weights[possible] = np.exp(-self.beta * (excess[possible] - excess.min()))
         return weights / weights.sum()
