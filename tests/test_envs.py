@@ -168,6 +168,7 @@ def test_keys_reach_every_action():
     assert keys[(ord("w"),)] == 0
 
 
+@pytest.mark.filterwarnings("ignore:.*matplotlib")
 def test_playable_by_hand(monkeypatch):
     """``gymnasium.utils.play`` accepts the environment and its keys."""
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")

@@ -1,4 +1,4 @@
-"""Kernels over many games at once: one row of ``states`` (and of ``kitchens``) per game; see ``dynamics``."""
+"""Kernels over many games at once: one row of ``states`` (and of ``kitchens``) per game; see ``vectors``."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.compiled import kernel
-from legible_envs.overcooked.dynamics import Kitchen, Vector, is_over, start, step
+from legible_envs.overcooked.dynamics import is_over, start, step
 from legible_envs.overcooked.goals import find_actions, find_goals
-from legible_envs.overcooked.observations import grid_observation, vector_observation
+from legible_envs.overcooked.observations import grid_observation, redraw_motion, vector_observation
+from legible_envs.overcooked.vectors import AT_PLAYERS, STEPS, Kitchen, Vector
 
 Vectors = npt.NDArray[np.int32]
 
@@ -44,8 +45,8 @@ def begin(
 
     Args:
         state: ``(state_size,)``, written.
-        kitchen: See ``dynamics``.
-        rules: See ``dynamics``.
+        kitchen: See ``vectors``.
+        rules: See ``vectors``.
         goals: ``(H*W,)``, written.
         mask: ``(6,)``, written.
     """
@@ -63,13 +64,13 @@ def play(
     actions: npt.NDArray[np.int64],
     goals: npt.NDArray[np.bool_],
     mask: npt.NDArray[np.int8],
-) -> tuple[float, bool]:
-    """Advance one single-player game by one tick; returns its reward and whether it is over.
+) -> tuple[float, bool, bool]:
+    """Advance one single-player game by one tick; returns ``(reward, over, changed)``.
 
     Args:
         state: ``(state_size,)``, changed in place.
-        kitchen: See ``dynamics``.
-        rules: See ``dynamics``.
+        kitchen: See ``vectors``.
+        rules: See ``vectors``.
         weights: ``(5,)`` rewards; see :func:`~legible_envs.overcooked.dynamics.step`.
         actions: ``(1,)`` action.
         goals: ``(H*W,)`` goals after the tick before, brought up to date.
@@ -79,7 +80,7 @@ def play(
     if changed:
         find_goals(state, kitchen, rules, 0, goals)
     find_actions(state, kitchen, rules, 0, mask)
-    return reward, is_over(state, rules)
+    return reward, is_over(state, rules), changed
 
 
 @kernel
@@ -88,43 +89,75 @@ def play_all(
     kitchens: npt.NDArray[np.int16],
     rules: Vector,
     weights: npt.NDArray[np.float64],
+    limit: int,
     actions: npt.NDArray[np.int64],
-    restart: npt.NDArray[np.bool_],
     goals: npt.NDArray[np.bool_],
+    drawn: Vector,
     masks: npt.NDArray[np.int8],
     rewards: npt.NDArray[np.float64],
-    over: npt.NDArray[np.bool_],
-) -> None:
-    """Advance ``N`` single-player games by one tick, or start them anew.
+    ends: npt.NDArray[np.bool_],
+    done: npt.NDArray[np.bool_],
+) -> int:
+    """Advance ``N`` single-player games by one tick, or start them anew; returns how many ended.
 
     Args:
         states: ``(N, state_size)``, changed in place.
         kitchens: ``(N, kitchen size)``.
         rules: One vector for all.
         weights: ``(5,)`` rewards.
+        limit: Steps after which a game is truncated; 0 means never.
         actions: ``(N, 1)`` actions; ignored where a game starts anew.
-        restart: ``(N,)`` whether to start the game anew instead.
         goals: ``(N, H*W)`` goals after the tick before, brought up to date.
+        drawn: ``(N,)``, set to -1 where more has changed than :func:`refresh_grids` looks for.
         masks: ``(N, 6)``, written.
         rewards: ``(N,)``, written.
-        over: ``(N,)``, written.
+        ends: ``(2, N)``, written: terminated, truncated.
+        done: ``(N,)`` whether to start the game anew instead; then whether it ended.
     """
+    ended = 0
     for i in range(states.shape[0]):
-        if restart[i]:
+        if done[i]:
             begin(states[i], kitchens[i], rules, goals[i], masks[i])
             rewards[i] = 0.0
-            over[i] = False
-        else:
-            rewards[i], over[i] = play(states[i], kitchens[i], rules, weights, actions[i], goals[i], masks[i])
+            ends[0, i] = ends[1, i] = done[i] = False
+            drawn[i] = -1
+            continue
+        rewards[i], over, changed = play(states[i], kitchens[i], rules, weights, actions[i], goals[i], masks[i])
+        if changed:
+            drawn[i] = -1
+        ends[0, i] = over
+        ends[1, i] = 0 < limit <= states[i, STEPS]
+        done[i] = ends[0, i] or ends[1, i]
+        if done[i]:
+            ended += 1
+    return ended
 
 
 @kernel
-def grid_observations(
-    states: Vectors, kitchens: npt.NDArray[np.int16], rules: Vector, grids: npt.NDArray[np.uint8]
+def refresh_grids(
+    states: Vectors,
+    kitchens: npt.NDArray[np.int16],
+    rules: Vector,
+    grids: npt.NDArray[np.uint8],
+    drawn: Vector,
 ) -> None:
-    """Write the ``(N, H, W, C)`` grid observations of ``N`` games; ``grids`` holds zeros."""
+    """Bring the ``(N, H, W, C)`` grid observations of ``N`` single-player games up to date.
+
+    Args:
+        states: ``(N, state_size)``.
+        kitchens: ``(N, kitchen size)``.
+        rules: One vector for all.
+        grids: The observations one tick ago, written.
+        drawn: ``(N,)`` cell of the player in ``grids`` where he has done nothing since but move and wait for a pot;
+            -1 where all has to be drawn anew. Written.
+    """
     for i in range(states.shape[0]):
-        grid_observation(states[i], kitchens[i], rules, grids[i])
+        if drawn[i] < 0:
+            grids[i] = 0
+            grid_observation(states[i], kitchens[i], rules, grids[i])
+        else:
+            redraw_motion(states[i], rules, drawn[i], grids[i])
+        drawn[i] = states[i, AT_PLAYERS]
 
 
 @kernel
@@ -138,3 +171,12 @@ def vector_observations(
     """Write the ``(N, D)`` vector observations of ``N`` games; ``routes`` ``(N, 7, 2, H*W)``, ``out`` zeros."""
     for i in range(states.shape[0]):
         vector_observation(states[i], kitchens[i], rules, routes[i], out[i])
+
+
+@kernel
+def all_within(values: npt.NDArray[np.int64], end: int) -> bool:
+    """Whether all integers lie in ``0 .. end - 1``."""
+    for value in values:
+        if value < 0 or value >= end:
+            return False
+    return True

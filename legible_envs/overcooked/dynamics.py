@@ -1,21 +1,6 @@
 """The game's dynamics: kernels on plain arrays, for any number of players.
 
-Every function works on one game, held in three vectors, so that a batch of games is three matrices:
-
-``rules`` (int32, made by :func:`legible_envs.overcooked.rules.pack_rules`): sizes, switches, offsets, recipes.
-    ``[height, width, players, pots, orders, cook_time, deliver_once, put_back, overtime, soft, at_orders, at_items,
-    at_pots, state_size, 0, 0, recipe 0's counts of tomato onion cabbage fish, recipe 1's, …]``
-
-``kitchen`` (int16, made by :func:`~legible_envs.overcooked.rules.pack_kitchen`): what does not change.
-    ``[cell codes (H*W), regions (H*W), start cell of each player]``; cells are flat, ``row * width + col``; walkable
-    cells that can reach one another carry the same region 1, 2, …, other cells 0.
-
-``state`` (int32): what changes.
-    ``[steps, crossings, deliveries, dishes out, soups in pots, (cell, facing, held) of each player, orders (0 open,
-    1 claimed by a soup, 2 delivered), item on each cell (H*W), pots (cell or -1, four counts, ticks, order or -1)]``
-
-Facing is an action: 0 N, 1 S, 2 E, 3 W. Items: 0 nothing, 1 tomato, 2 onion, 3 cabbage, 4 fish, 5 dish, ``6 + r`` a
-soup of recipe ``r``. For recorded games in named arrays instead of vectors see :mod:`legible_envs.overcooked.replay`.
+Every function works on one game, held in the vectors ``rules``, ``kitchen`` and ``state`` described in ``vectors``.
 
 One tick: players who INTERACT do so in the order of their numbers, with the cell they face; then the others turn, and
 move if the target is free (players whose moves would share or swap cells stay); then every full pot ticks.
@@ -28,62 +13,55 @@ they were filled, accepted ingredients and soups are always of use, and soups on
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 import numpy.typing as npt
 
 from legible_envs.compiled import kernel
 from legible_envs.overcooked.layout import COUNTER, FLOOR, OBSTACLE
-
-Vector = npt.NDArray[np.int32]
-Kitchen = npt.NDArray[np.int16]
-
-NORTH: Final = 0
-SOUTH: Final = 1
-EAST: Final = 2
-WEST: Final = 3
-STAY: Final = 4
-INTERACT: Final = 5
-
-DISH_CELL: Final = 7
-POT_CELL: Final = 8
-SERVING_CELL: Final = 9
-DISH: Final = 5
-SOUP: Final = 6
-
-HEIGHT: Final = 0
-WIDTH: Final = 1
-NUM_PLAYERS: Final = 2
-NUM_POTS: Final = 3
-NUM_ORDERS: Final = 4
-COOK_TIME: Final = 5
-DELIVER_ONCE: Final = 6
-PUT_BACK: Final = 7
-OVERTIME: Final = 8
-SOFT: Final = 9
-AT_ORDERS: Final = 10
-AT_ITEMS: Final = 11
-AT_POTS: Final = 12
-STATE_SIZE: Final = 13
-RECIPES: Final = 16
-
-STEPS: Final = 0
-CROSSINGS: Final = 1
-DELIVERIES: Final = 2
-DISHES_OUT: Final = 3
-SOUPS_IN_POTS: Final = 4
-AT_PLAYERS: Final = 5
-POT_RECORD: Final = 7
-
-NOTHING_HAPPENS: Final = 0
-TAKES: Final = 1
-PUTS_BACK: Final = 2
-PICKS_UP: Final = 3
-PUTS_DOWN: Final = 4
-ADDS: Final = 5
-SCOOPS: Final = 6
-DELIVERS: Final = 7
+from legible_envs.overcooked.vectors import (
+    ADDS,
+    AT_ITEMS,
+    AT_ORDERS,
+    AT_PLAYERS,
+    AT_POTS,
+    COOK_TIME,
+    CROSSINGS,
+    DELIVER_ONCE,
+    DELIVERIES,
+    DELIVERS,
+    DISH,
+    DISH_CELL,
+    DISHES_OUT,
+    EAST,
+    HEIGHT,
+    INTERACT,
+    NORTH,
+    NOTHING_HAPPENS,
+    NUM_ORDERS,
+    NUM_PLAYERS,
+    NUM_POTS,
+    OVERTIME,
+    PICKS_UP,
+    POT_CELL,
+    POT_RECORD,
+    PUT_BACK,
+    PUTS_BACK,
+    PUTS_DOWN,
+    RECIPES,
+    SCOOPS,
+    SERVING_CELL,
+    SOFT,
+    SOUP,
+    SOUPS_IN_POTS,
+    SOUTH,
+    STATE_SIZE,
+    STAY,
+    STEPS,
+    TAKES,
+    WIDTH,
+    Kitchen,
+    Vector,
+)
 
 # -- the floor plan ---------------------------------------------------------------------------------------------------
 

@@ -11,12 +11,12 @@ import numpy.typing as npt
 from gymnasium import spaces
 
 from legible_envs.overcooked import batch
-from legible_envs.overcooked.dynamics import CROSSINGS, DELIVERIES, STATE_SIZE, Kitchen, Vector
 from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.overcooked.observations import grid_observation, vector_observation
 from legible_envs.overcooked.recipes import PAPER_SOUPS
 from legible_envs.overcooked.settings import JsonSpec, KitchenSettings, PackedKitchen, check_options, read_layout
 from legible_envs.overcooked.snapshot import draw_small, make_view, name_goals, to_text
+from legible_envs.overcooked.vectors import CROSSINGS, DELIVERIES, STATE_SIZE, Kitchen, Vector
 from legible_envs.overcooked.view import GameView
 
 __all__ = ["OvercookedEnv"]
@@ -247,7 +247,7 @@ class OvercookedEnv(JsonSpec, gym.Env[npt.NDArray[Any], Any]):
         if not valid:
             raise ValueError(f"expected an action 0..{NUM_ACTIONS - 1}, got {action!r}")
         mask = np.empty(NUM_ACTIONS, dtype=np.int8)
-        reward, over = batch.play(
+        reward, over, _ = batch.play(
             self._state, self._kitchen, self._rules, self.settings.weights, self._actions, self._goals, mask
         )
         if self.render_mode == "human":
@@ -343,7 +343,7 @@ class OvercookedEnv(JsonSpec, gym.Env[npt.NDArray[Any], Any]):
         return make_view(self._packed.layout, self._state, self._rules, self.settings.rules)
 
     def arrays(self) -> tuple[Vector, Kitchen, Vector]:
-        """The game's ``(state, kitchen, rules)`` as described in ``dynamics``; not copies, to be read only."""
+        """The game's ``(state, kitchen, rules)`` as described in ``vectors``; not copies, to be read only."""
         return self._state, self._kitchen, self._rules
 
     def valid_goal_names(self) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""What a player may do and reach for next: kernels on the vectors described in ``dynamics``.
+"""What a player may do and reach for next: kernels on the vectors described in ``vectors``.
 
 The goals here are those of the running game (the candidate set ``game``): stations and counters where an INTERACT would
 bring the game forward, as far as the player can get to them. With one pot they are the goals of
@@ -12,7 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.compiled import kernel
-from legible_envs.overcooked.dynamics import (
+from legible_envs.overcooked.dynamics import accepts, interaction, is_over, neighbour, usable, walkable
+from legible_envs.overcooked.layout import COUNTER, OBSTACLE
+from legible_envs.overcooked.vectors import (
     AT_ITEMS,
     AT_PLAYERS,
     AT_POTS,
@@ -32,14 +34,7 @@ from legible_envs.overcooked.dynamics import (
     WIDTH,
     Kitchen,
     Vector,
-    accepts,
-    interaction,
-    is_over,
-    neighbour,
-    usable,
-    walkable,
 )
-from legible_envs.overcooked.layout import COUNTER, OBSTACLE
 
 __all__ = ["find_actions", "find_goals", "missing_station"]
 
@@ -108,9 +103,9 @@ def find_goals(state: Vector, kitchen: Kitchen, rules: Vector, player: int, goal
     hands for where the item is of use. An item that is of no use now is taken back or put on any free counter.
 
     Args:
-        state: See ``dynamics``.
-        kitchen: See ``dynamics``.
-        rules: See ``dynamics``.
+        state: See ``vectors``.
+        kitchen: See ``vectors``.
+        rules: See ``vectors``.
         player: Number of the player.
         goals: ``(H*W,)``, written.
     """
@@ -144,9 +139,9 @@ def find_actions(state: Vector, kitchen: Kitchen, rules: Vector, player: int, ma
     """Mark the actions that do something: turn or move the player, or change what INTERACT can change; STAY always.
 
     Args:
-        state: See ``dynamics``.
-        kitchen: See ``dynamics``.
-        rules: See ``dynamics``.
+        state: See ``vectors``.
+        kitchen: See ``vectors``.
+        rules: See ``vectors``.
         player: Number of the player.
         mask: ``(6,)``, written.
     """

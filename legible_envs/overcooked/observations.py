@@ -1,4 +1,4 @@
-"""What an agent sees: kernels that write observations from the vectors described in ``dynamics``."""
+"""What an agent sees: kernels that write observations from the vectors described in ``vectors``."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.compiled import kernel
-from legible_envs.overcooked.dynamics import (
+from legible_envs.overcooked.dynamics import neighbour, walkable
+from legible_envs.overcooked.layout import COUNTER
+from legible_envs.overcooked.vectors import (
     AT_ITEMS,
     AT_ORDERS,
     AT_PLAYERS,
@@ -26,12 +28,9 @@ from legible_envs.overcooked.dynamics import (
     WIDTH,
     Kitchen,
     Vector,
-    neighbour,
-    walkable,
 )
-from legible_envs.overcooked.layout import COUNTER
 
-__all__ = ["GRID_CHANNELS", "NUM_FEATURES", "find_routes", "grid_observation", "vector_observation"]
+__all__ = ["GRID_CHANNELS", "NUM_FEATURES", "find_routes", "grid_observation", "redraw_motion", "vector_observation"]
 
 GRID_CHANNELS: Final = (
     *("counter", "obstacle", "tomato station", "onion station", "cabbage station", "fish station", "dish station"),
@@ -74,9 +73,9 @@ def grid_observation(state: Vector, kitchen: Kitchen, rules: Vector, grid: Grid)
     """Write a grid observation; channels as in ``GRID_CHANNELS``, then one per recipe: 1 until it is delivered.
 
     Args:
-        state: See ``dynamics``.
-        kitchen: See ``dynamics``.
-        rules: See ``dynamics``.
+        state: See ``vectors``.
+        kitchen: See ``vectors``.
+        rules: See ``vectors``.
         grid: ``(H, W, 22 + recipes)``, zeros, written.
     """
     width = rules[WIDTH]
@@ -91,6 +90,18 @@ def grid_observation(state: Vector, kitchen: Kitchen, rules: Vector, grid: Grid)
                     _draw_item(state[rules[AT_ITEMS] + cell], rules, grid, row, col)
             for order in range(orders):
                 grid[row, col, ORDERS + order] = 1 if state[rules[AT_ORDERS] + order] != 2 else 0
+    _draw_motion(state, rules, grid)
+    for number in range(rules[NUM_POTS]):
+        pot = rules[AT_POTS] + POT_RECORD * number
+        for kind in range(4):
+            if state[pot] >= 0:
+                grid[state[pot] // width, state[pot] % width, CONTENTS + kind] = state[pot + 1 + kind]
+
+
+@kernel
+def _draw_motion(state: Vector, rules: Vector, grid: Grid) -> None:
+    """Mark what changes without anything being used: players with what they hold, and pots that cook."""
+    width = rules[WIDTH]
     for player in range(rules[NUM_PLAYERS]):
         at = AT_PLAYERS + 3 * player
         row, col = state[at] // width, state[at] % width
@@ -99,13 +110,26 @@ def grid_observation(state: Vector, kitchen: Kitchen, rules: Vector, grid: Grid)
         _draw_item(state[at + 2], rules, grid, row, col)
     for number in range(rules[NUM_POTS]):
         pot = rules[AT_POTS] + POT_RECORD * number
-        if state[pot] < 0:
-            continue
-        row, col = state[pot] // width, state[pot] % width
-        for kind in range(4):
-            grid[row, col, CONTENTS + kind] = state[pot + 1 + kind]
-        grid[row, col, TICKS] = min(state[pot + 5], 255)
-        grid[row, col, READY] = 1 if state[pot + 6] >= 0 and state[pot + 5] >= rules[COOK_TIME] else 0
+        if state[pot] >= 0 and state[pot + 6] >= 0:
+            row, col = state[pot] // width, state[pot] % width
+            grid[row, col, TICKS] = min(state[pot + 5], 255)
+            grid[row, col, READY] = 1 if state[pot + 5] >= rules[COOK_TIME] else 0
+
+
+@kernel
+def redraw_motion(state: Vector, rules: Vector, before: int, grid: Grid) -> None:
+    """Bring a single-player grid observation up to date after a tick in which nothing was used.
+
+    Args:
+        state: See ``vectors``.
+        rules: See ``vectors``.
+        before: Flat cell where the player was one tick ago.
+        grid: The observation one tick ago, written.
+    """
+    row, col = before // rules[WIDTH], before % rules[WIDTH]
+    # Only players stand on such a cell, so that all its items are theirs.
+    grid[row, col, PLAYER:TICKS] = 0
+    _draw_motion(state, rules, grid)
 
 
 @kernel
@@ -113,8 +137,8 @@ def find_routes(kitchen: Kitchen, rules: Vector, routes: npt.NDArray[np.int16]) 
     """Find the nearest station of every type from every cell.
 
     Args:
-        kitchen: See ``dynamics``.
-        rules: See ``dynamics``.
+        kitchen: See ``vectors``.
+        rules: See ``vectors``.
         routes: ``(7, 2, H*W)``, written: for each station type the steps to a cell beside the nearest one, and the
             cell of that station; -1 where there is no way.
     """
@@ -179,9 +203,9 @@ def vector_observation(
     """Write a vector observation; its entries are listed in the environment's documentation.
 
     Args:
-        state: See ``dynamics``.
-        kitchen: See ``dynamics``.
-        rules: See ``dynamics``.
+        state: See ``vectors``.
+        kitchen: See ``vectors``.
+        rules: See ``vectors``.
         routes: Made by :func:`find_routes`.
         out: ``(51 + recipes,)``, zeros, written.
     """

@@ -8,18 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.compiled import kernel
-from legible_envs.overcooked.dynamics import (
-    AT_PLAYERS,
-    HEIGHT,
-    INTERACT,
-    STAY,
-    WIDTH,
-    Kitchen,
-    Vector,
-    neighbour,
-    walkable,
-)
+from legible_envs.overcooked.dynamics import neighbour, walkable
 from legible_envs.overcooked.layout import OBSTACLE
+from legible_envs.overcooked.vectors import AT_PLAYERS, HEIGHT, INTERACT, STAY, WIDTH, Kitchen, Vector
 
 __all__ = ["ScriptedPlayer", "choose_action", "find_distances"]
 
@@ -30,8 +21,8 @@ def find_distances(goal: int, kitchen: Kitchen, rules: Vector, avoid: bool, dist
 
     Args:
         goal: Flat cell of a station or counter.
-        kitchen: See ``dynamics``.
-        rules: See ``dynamics``.
+        kitchen: See ``vectors``.
+        rules: See ``vectors``.
         avoid: Whether to keep off virtual obstacles, even those that can be crossed.
         distances: ``(H*W,)``, written; -1 where there is no way.
     """
@@ -64,8 +55,8 @@ def choose_action(
     """Next action on a shortest path to the goal; STAY beside a pot that is not ready yet.
 
     Args:
-        state: See ``dynamics``.
-        rules: See ``dynamics``.
+        state: See ``vectors``.
+        rules: See ``vectors``.
         goal: Flat cell of the goal.
         distances: Made by :func:`find_distances` for this goal.
         can_interact: Whether INTERACT would do something now.

@@ -11,7 +11,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from legible_envs.overcooked.dynamics import (
+from legible_envs.overcooked.layout import INGREDIENTS, OvercookedLayout
+from legible_envs.overcooked.rules import RULE_SETS, GameRules, pack_kitchen, pack_rules
+from legible_envs.overcooked.vectors import (
     AT_ITEMS,
     AT_ORDERS,
     AT_PLAYERS,
@@ -25,8 +27,6 @@ from legible_envs.overcooked.dynamics import (
     SOUPS_IN_POTS,
     STATE_SIZE,
 )
-from legible_envs.overcooked.layout import INGREDIENTS, OvercookedLayout
-from legible_envs.overcooked.rules import RULE_SETS, GameRules, pack_kitchen, pack_rules
 
 __all__ = ["GameArrays", "predict_transitions"]
 

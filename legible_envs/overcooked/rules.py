@@ -73,7 +73,7 @@ RULE_SETS: Final = {"legible": LEGIBLE, "overcooked-ai-2019": OVERCOOKED_AI_2019
 def pack_rules(
     rules: GameRules, shape: tuple[int, int], num_players: int = 1, num_pots: int = 1
 ) -> npt.NDArray[np.int32]:
-    """Rules and sizes as the ``rules`` vector described in :mod:`~legible_envs.overcooked.dynamics`.
+    """Rules and sizes as the ``rules`` vector described in :mod:`~legible_envs.overcooked.vectors`.
 
     Args:
         rules: The rules.
@@ -95,7 +95,7 @@ def pack_rules(
 def pack_kitchen(
     layout: OvercookedLayout, rules: npt.NDArray[np.int32], starts: Sequence[tuple[int, int]] | None = None
 ) -> npt.NDArray[np.int16]:
-    """A layout as the ``kitchen`` vector described in :mod:`~legible_envs.overcooked.dynamics`.
+    """A layout as the ``kitchen`` vector described in :mod:`~legible_envs.overcooked.vectors`.
 
     Args:
         layout: The kitchen; its shape must be the one in ``rules``.
@@ -105,7 +105,8 @@ def pack_kitchen(
     Raises:
         LayoutError: Fewer starts than players, or more pots than ``rules`` has room for.
     """
-    from legible_envs.overcooked import dynamics
+    from legible_envs.overcooked.dynamics import label_regions
+    from legible_envs.overcooked.vectors import POT_CELL
 
     starts = layout.starts if starts is None else starts
     height, width, players, pots = (int(value) for value in rules[:4])
@@ -113,12 +114,12 @@ def pack_kitchen(
         raise LayoutError(f"expected a kitchen of shape {(height, width)}, got {layout.shape}", rule="shape")
     if len(starts) < players:
         raise LayoutError(f"{players} players need as many starts; the kitchen has {len(starts)}", rule="start")
-    found = int(np.count_nonzero(layout.cells == dynamics.POT_CELL))
+    found = int(np.count_nonzero(layout.cells == POT_CELL))
     if found > pots:
         raise LayoutError(f"the kitchen has {found} pots, there is room for {pots}", rule="pots")
     cells = height * width
     kitchen = np.empty(2 * cells + players, dtype=np.int16)
     kitchen[:cells] = layout.cells.ravel()
     kitchen[2 * cells :] = [row * width + col for row, col in starts[:players]]
-    dynamics.label_regions(kitchen, rules)
+    label_regions(kitchen, rules)
     return kitchen

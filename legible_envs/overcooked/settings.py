@@ -14,13 +14,13 @@ from gymnasium.envs.registration import EnvSpec
 
 from legible_envs.errors import LayoutError
 from legible_envs.overcooked.distribution import LayoutDistribution, default_layout, read_distribution
-from legible_envs.overcooked.dynamics import POT_CELL, Kitchen, Vector
 from legible_envs.overcooked.goals import missing_station
 from legible_envs.overcooked.layout import INGREDIENTS, STATION_TYPES, OvercookedLayout
 from legible_envs.overcooked.observations import GRID_CHANNELS, NUM_FEATURES, find_routes
 from legible_envs.overcooked.recipes import PAPER_SOUPS
 from legible_envs.overcooked.rules import GameRules, pack_kitchen, pack_rules
 from legible_envs.overcooked.snapshot import RGB_TILE
+from legible_envs.overcooked.vectors import POT_CELL, Kitchen, Vector
 
 __all__ = [
     "OBS_TYPES",
@@ -102,7 +102,7 @@ def _read_array(value: Any, shape: tuple[int, int]) -> OvercookedLayout:
 
 
 class PackedKitchen(NamedTuple):
-    """A kitchen as the kernels read it; see ``dynamics``, and ``observations.find_routes`` for the routes."""
+    """A kitchen as the kernels read it; see ``vectors``, and ``observations.find_routes`` for the routes."""
 
     layout: OvercookedLayout
     rules: Vector

@@ -9,7 +9,9 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from legible_envs.overcooked.dynamics import (
+from legible_envs.overcooked.layout import INGREDIENTS, OvercookedLayout
+from legible_envs.overcooked.rules import GameRules
+from legible_envs.overcooked.vectors import (
     AT_ITEMS,
     AT_ORDERS,
     AT_PLAYERS,
@@ -22,8 +24,6 @@ from legible_envs.overcooked.dynamics import (
     STEPS,
     Vector,
 )
-from legible_envs.overcooked.layout import INGREDIENTS, OvercookedLayout
-from legible_envs.overcooked.rules import GameRules
 from legible_envs.overcooked.view import GameView, Item, PlayerView, PotView
 
 __all__ = ["RGB_TILE", "draw_small", "make_view", "name_goals", "tile_pictures", "to_text"]

@@ -14,9 +14,8 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from legible_envs.overcooked import batch
-from legible_envs.overcooked.dynamics import CROSSINGS, DELIVERIES, STATE_SIZE, STEPS, Kitchen, Vector
+from legible_envs.overcooked.batch_game import GameOfBatch
 from legible_envs.overcooked.env import NUM_ACTIONS, OvercookedEnv
-from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.overcooked.rules import pack_rules
 from legible_envs.overcooked.settings import (
     JsonSpec,
@@ -26,7 +25,8 @@ from legible_envs.overcooked.settings import (
     count_pots,
     read_layout,
 )
-from legible_envs.overcooked.snapshot import draw_small, make_view, name_goals, tile_pictures, to_text
+from legible_envs.overcooked.snapshot import draw_small, make_view, tile_pictures, to_text
+from legible_envs.overcooked.vectors import CROSSINGS, DELIVERIES, STATE_SIZE
 from legible_envs.overcooked.view import GameView
 
 __all__ = ["OvercookedVectorEnv"]
@@ -88,6 +88,7 @@ class OvercookedVectorEnv(JsonSpec, VectorEnv[npt.NDArray[Any], npt.NDArray[Any]
         self._seeds = [-1] * self.num_envs
         self._window: Any = None
         self._done = np.zeros(self.num_envs, dtype=np.bool_)
+        self._ended = 0
         self._begun = False
         self._allocate(self.settings.pack(self.settings.preview()))
 
@@ -105,6 +106,10 @@ class OvercookedVectorEnv(JsonSpec, VectorEnv[npt.NDArray[Any], npt.NDArray[Any]
         self._states = np.zeros((count, int(packed.rules[STATE_SIZE])), dtype=np.int32)
         self._goals = np.zeros((count, cells), dtype=np.bool_)
         self._observations_shape = (count, *self.single_observation_space.shape)  # type: ignore[misc]
+        self._grids = np.zeros(self._observations_shape if self.settings.obs_type == "grid" else 0, dtype=np.uint8)
+        self._goals_shape = (count, *self.settings.shape)
+        self._drawn = np.full(count, -1, dtype=np.int32)
+        self._everyone = np.ones(count, dtype=np.bool_)
 
     # -- the Gymnasium interface --------------------------------------------------------------------------------------
 
@@ -134,7 +139,6 @@ class OvercookedVectorEnv(JsonSpec, VectorEnv[npt.NDArray[Any], npt.NDArray[Any]
         for i in np.flatnonzero(which):
             if seeds[i] is not None:
                 self._rngs[i], self._seeds[i] = seeding.np_random(seeds[i])
-        self._done[which] = False
         self._begun = True
         masks = self._restart(which)
         if self.render_mode == "human":
@@ -158,35 +162,31 @@ class OvercookedVectorEnv(JsonSpec, VectorEnv[npt.NDArray[Any], npt.NDArray[Any]
         """
         moves = self._read_actions(actions)
         self._check_begun()
-        restart = self._done
-        if self.autoreset_mode == AutoresetMode.NEXT_STEP:
-            for i in np.flatnonzero(restart):
+        if self._ended:
+            for i in np.flatnonzero(self._done):
                 self._enter_next(int(i))
         rewards = np.empty(self.num_envs)
-        terminations = np.empty(self.num_envs, dtype=np.bool_)
+        ends = np.empty((2, self.num_envs), dtype=np.bool_)
         masks = np.empty((self.num_envs, NUM_ACTIONS), dtype=np.int8)
-        batch.play_all(
+        self._ended = batch.play_all(
             self._states,
             self._kitchens,
             self._rules,
             self.settings.weights,
+            self.max_episode_steps or 0,
             moves,
-            restart,
             self._goals,
+            self._drawn,
             masks,
             rewards,
-            terminations,
+            ends,
+            self._done,
         )
-        if self.max_episode_steps is None:
-            truncations = np.zeros(self.num_envs, dtype=np.bool_)
-        else:
-            truncations = self._states[:, STEPS] >= self.max_episode_steps
-        self._done = terminations | truncations
+        terminations, truncations = ends
         infos: Infos = {}
-        if self.autoreset_mode == AutoresetMode.SAME_STEP and self._done.any():
+        if self._ended and self.autoreset_mode == AutoresetMode.SAME_STEP:
             infos = self._finish(self._done, masks)
             self._restart(self._done, masks)
-            self._done = np.zeros(self.num_envs, dtype=np.bool_)
         infos.update(self._infos(masks))
         if self.render_mode == "human":
             self.render()
@@ -233,7 +233,7 @@ class OvercookedVectorEnv(JsonSpec, VectorEnv[npt.NDArray[Any], npt.NDArray[Any]
         Raises:
             AttributeError: The games have nothing of this name.
         """
-        values = [getattr(_Game(self, i), name) for i in range(self.num_envs)]
+        values = [getattr(GameOfBatch(self, i), name) for i in range(self.num_envs)]
         return tuple(value(*args, **kwargs) if callable(value) else value for value in values)
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
@@ -312,14 +312,14 @@ class OvercookedVectorEnv(JsonSpec, VectorEnv[npt.NDArray[Any], npt.NDArray[Any]
         moves = np.asarray(actions)
         if moves.shape != (self.num_envs,) or moves.dtype.kind not in "iu":
             raise ValueError(f"expected {self.num_envs} integer actions, got shape {moves.shape} of {moves.dtype}")
-        if moves.min() < 0 or moves.max() >= NUM_ACTIONS:
+        if not batch.all_within(moves, NUM_ACTIONS):
             raise ValueError(f"expected actions 0..{NUM_ACTIONS - 1}, got {moves}")
         return moves.astype(np.int64).reshape(-1, 1)
 
     def _check_begun(self) -> None:
         if not self._begun:
             raise ResetNeeded("Cannot call envs.step() before calling envs.reset()")
-        if self.autoreset_mode == AutoresetMode.DISABLED and self._done.any():
+        if self._ended and self.autoreset_mode == AutoresetMode.DISABLED:
             raise ResetNeeded(
                 f"games {np.flatnonzero(self._done).tolist()} are over and autoreset is disabled: reset them with "
                 "envs.reset(options={'reset_mask': mask})"
@@ -361,14 +361,16 @@ class OvercookedVectorEnv(JsonSpec, VectorEnv[npt.NDArray[Any], npt.NDArray[Any]
         for i in np.flatnonzero(which):
             self._enter_next(int(i))
             batch.begin(self._states[i], self._kitchens[i], self._rules, self._goals[i], masks[i])
+        self._drawn[which] = -1
+        self._done[which] = False
+        self._ended = int(np.count_nonzero(self._done))
         return masks
 
     def _observe(self) -> npt.NDArray[Any]:
         obs_type = self.settings.obs_type
         if obs_type == "grid":
-            grids = np.zeros(self._observations_shape, dtype=np.uint8)
-            batch.grid_observations(self._states, self._kitchens, self._rules, grids)
-            return grids
+            batch.refresh_grids(self._states, self._kitchens, self._rules, self._grids, self._drawn)
+            return self._grids.copy()
         if obs_type == "vector":
             features = np.zeros(self._observations_shape, dtype=np.float32)
             batch.vector_observations(self._states, self._kitchens, self._rules, self._routes, features)
@@ -377,22 +379,21 @@ class OvercookedVectorEnv(JsonSpec, VectorEnv[npt.NDArray[Any], npt.NDArray[Any]
 
     def _infos(self, masks: npt.NDArray[np.int8], which: npt.NDArray[np.bool_] | None = None) -> Infos:
         """The games' infos as ``SyncVectorEnv`` gathers them; zeros (None) in games that have none."""
-        height, width = self.settings.shape
-        values: Infos = {
-            "valid_goals": self._goals.reshape(-1, height, width).copy(),
-            "action_mask": masks,
-            "layout_id": self._ids.copy(),
-            "deliveries": self._states[:, DELIVERIES].astype(np.int64),
-            "crossings": self._states[:, CROSSINGS].astype(np.int64),
-        }
-        everyone = which is None or bool(which.all())
+        counts = np.ascontiguousarray(self._states[:, CROSSINGS : DELIVERIES + 1].T, dtype=np.int64)
         infos: Infos = {}
-        for key, value in values.items():
-            if not everyone:
-                value = value.copy()
-                value[~which] = None if value.dtype == object else 0  # type: ignore[operator]
+        for key, value in (
+            ("valid_goals", self._goals.copy().reshape(self._goals_shape)),
+            ("action_mask", masks),
+            ("layout_id", self._ids.copy()),
+            ("deliveries", counts[1]),
+            ("crossings", counts[0]),
+        ):
             infos[key] = value
-            infos[f"_{key}"] = np.ones(self.num_envs, dtype=np.bool_) if which is None else which.copy()
+            infos[f"_{key}"] = (self._everyone if which is None else which).copy()
+        if which is not None and not which.all():
+            for key in ("valid_goals", "action_mask", "deliveries", "crossings"):
+                infos[key][~which] = 0
+            infos["layout_id"][~which] = None
         return infos
 
     def _finish(self, done: npt.NDArray[np.bool_], masks: npt.NDArray[np.int8]) -> Infos:
@@ -407,51 +408,3 @@ class OvercookedVectorEnv(JsonSpec, VectorEnv[npt.NDArray[Any], npt.NDArray[Any]
             "final_info": self._infos(masks.copy(), done),
             "_final_info": done.copy(),
         }
-
-
-class _Game:
-    """One game of a batch, with the attributes of an ``OvercookedEnv``."""
-
-    def __init__(self, envs: OvercookedVectorEnv, index: int) -> None:
-        self._envs = envs
-        self._index = index
-
-    @property
-    def layout(self) -> OvercookedLayout:
-        packed = self._envs._chosen[self._index] or self._envs._packed[self._index]
-        return packed.layout
-
-    @property
-    def np_random(self) -> np.random.Generator:
-        return self._envs._rng(self._index)
-
-    @property
-    def np_random_seed(self) -> int:
-        self._envs._rng(self._index)
-        return self._envs._seeds[self._index]
-
-    @property
-    def action_space(self) -> Any:
-        return self._envs.single_action_space
-
-    @property
-    def observation_space(self) -> Any:
-        return self._envs.single_observation_space
-
-    def view(self) -> GameView:
-        return self._envs.view(self._index)
-
-    def arrays(self) -> tuple[Vector, Kitchen, Vector]:
-        return self._envs._states[self._index], self._envs._kitchens[self._index], self._envs._rules
-
-    def valid_goal_names(self) -> tuple[str, ...]:
-        return name_goals(self._envs._packed[self._index].layout, self._envs._goals[self._index])
-
-    def render(self) -> Any:
-        frames = self._envs.render()
-        return None if frames is None else frames[self._index]
-
-    def __getattr__(self, name: str) -> Any:
-        if name in ("settings", "render_mode", "metadata", "get_keys_to_action"):
-            return getattr(self._envs if name != "get_keys_to_action" else OvercookedEnv, name)
-        raise AttributeError(f"the games of a batch have no attribute {name!r}")

@@ -1,0 +1,80 @@
+"""One game of a batch, looked at as if it were an environment of its own."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from legible_envs.overcooked.env import OvercookedEnv
+from legible_envs.overcooked.layout import OvercookedLayout
+from legible_envs.overcooked.snapshot import name_goals
+from legible_envs.overcooked.vectors import Kitchen, Vector
+from legible_envs.overcooked.view import GameView
+
+if TYPE_CHECKING:
+    from legible_envs.overcooked.vector_env import OvercookedVectorEnv
+
+__all__ = ["GameOfBatch"]
+
+
+class GameOfBatch:
+    """One game of a batch, with the attributes of an :class:`~legible_envs.overcooked.env.OvercookedEnv`.
+
+    Args:
+        envs: The batch.
+        index: Number of the game.
+    """
+
+    def __init__(self, envs: OvercookedVectorEnv, index: int) -> None:
+        self._envs = envs
+        self._index = index
+
+    @property
+    def layout(self) -> OvercookedLayout:
+        """The kitchen: the one set for the next reset, else the one being played in."""
+        packed = self._envs._chosen[self._index] or self._envs._packed[self._index]
+        return packed.layout
+
+    @property
+    def np_random(self) -> np.random.Generator:
+        """The game's random generator."""
+        return self._envs._rng(self._index)
+
+    @property
+    def np_random_seed(self) -> int:
+        """The seed of the game's random generator."""
+        self._envs._rng(self._index)
+        return self._envs._seeds[self._index]
+
+    @property
+    def action_space(self) -> Any:
+        """The space of its actions."""
+        return self._envs.single_action_space
+
+    @property
+    def observation_space(self) -> Any:
+        """The space of its observations."""
+        return self._envs.single_observation_space
+
+    def view(self) -> GameView:
+        """A snapshot of the game in words, for drawing."""
+        return self._envs.view(self._index)
+
+    def arrays(self) -> tuple[Vector, Kitchen, Vector]:
+        """The game's ``(state, kitchen, rules)`` as described in ``vectors``; not copies, to be read only."""
+        return self._envs._states[self._index], self._envs._kitchens[self._index], self._envs._rules
+
+    def valid_goal_names(self) -> tuple[str, ...]:
+        """Names of the cells the player may reach for next, in reading order."""
+        return name_goals(self._envs._packed[self._index].layout, self._envs._goals[self._index])
+
+    def render(self) -> Any:
+        """The game's picture or drawing."""
+        frames = self._envs.render()
+        return None if frames is None else frames[self._index]
+
+    def __getattr__(self, name: str) -> Any:
+        if name in ("settings", "render_mode", "metadata", "get_keys_to_action"):
+            return getattr(self._envs if name != "get_keys_to_action" else OvercookedEnv, name)
+        raise AttributeError(f"the games of a batch have no attribute {name!r}")
