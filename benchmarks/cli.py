@@ -100,7 +100,10 @@ class _Prefix(click.ParamType[Any]):
 @_out
 @click.pass_context
 def optimize(ctx: click.Context, domain: str, out: Path | None, **settings: Any) -> None:
-    """Search for layouts; write the archive, curves, pictures and a report."""
+    """Search for layouts.
+
+    Writes the archive, curves, a picture and a report into the --out folder.
+    """
     from benchmarks.searching import default_folder, resumed_settings, run_search
 
     given = {name for name in settings if ctx.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT}
@@ -113,7 +116,10 @@ def optimize(ctx: click.Context, domain: str, out: Path | None, **settings: Any)
 @main.command()
 @click.argument("run", type=click.Path(exists=True, file_okay=False, path_type=Path))
 def report(run: Path) -> None:
-    """Write report.html and best.png anew from the files of a search, finished or not."""
+    """Write the report of a search anew.
+
+    RUN is its folder; the search may be finished or not. Writes report.html and best.png.
+    """
     from benchmarks.report import write_best_image, write_report
 
     write_best_image(run)
@@ -139,8 +145,11 @@ def emitters() -> None:
 @click.option("--trajectories", type=click.Path(exists=True, dir_okay=False, path_type=Path),
               help="Recorded walks: also say how well predictors read them in this kitchen.")  # fmt: skip
 def score(layout: str, prefix: Any, pots: int | None, trajectories: Path | None) -> None:
-    """Score one kitchen exactly: legibility, distance, and what belongs beside them."""
-    from benchmarks.inspecting import score_lines, trajectory_table
+    """Score one kitchen exactly.
+
+    Prints legibility, distance, and what belongs beside them.
+    """
+    from benchmarks.inspecting import read_people, score_lines
     from benchmarks.kitchens import load_kitchen
 
     kitchen = load_kitchen(layout, prefix=prefix, pots=pots)
@@ -149,7 +158,7 @@ def score(layout: str, prefix: Any, pots: int | None, trajectories: Path | None)
     if trajectories is not None:
         from benchmarks.console import say
 
-        say().print(trajectory_table(kitchen, trajectories))
+        read_people(say(), kitchen, trajectories)
 
 
 @main.command()
@@ -158,7 +167,10 @@ def score(layout: str, prefix: Any, pots: int | None, trajectories: Path | None)
 @_pots
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="Where to write the picture (.png).")
 def show(layout: str, prefix: Any, pots: int | None, out: Path | None) -> None:
-    """Draw a kitchen and explain its score: which reaches win and lose it, and where goals are confused."""
+    """Draw a kitchen and explain its score.
+
+    Which reaches win and lose it, and where goals are confused.
+    """
     from benchmarks.console import say
     from benchmarks.inspecting import show_kitchen
     from benchmarks.kitchens import load_kitchen
@@ -168,12 +180,20 @@ def show(layout: str, prefix: Any, pots: int | None, out: Path | None) -> None:
 
 @main.command()
 @_layout
-def play(layout: str) -> None:
-    """Cook in a kitchen yourself: arrow keys to walk, space to interact."""
+@click.option("--fps", type=click.IntRange(1, 60), default=8, show_default=True, help="Steps per second.")
+@click.option("--record", type=click.Path(dir_okay=False, path_type=Path), help="Write your actions to this .npz file.")
+def play(layout: str, fps: int, record: Path | None) -> None:
+    """Cook in a kitchen yourself.
+
+    Arrow keys or W A S D walk, space or E interacts, Esc ends.
+    """
     from benchmarks.kitchens import load_kitchen
     from legible_envs.overcooked.play import play as play_layout
 
-    play_layout(load_kitchen(layout).layout)
+    played = play_layout(load_kitchen(layout).layout, fps=fps, record=record)
+    click.echo(f"{len(played.actions):,} steps, reward {played.rewards.sum():g}")
+    if record is not None and len(played.actions):
+        click.echo(f"recorded: {record}")
 
 
 # -- recorded people, demonstration, speed -----------------------------------------------------------------------------
@@ -189,7 +209,10 @@ def humans() -> None:
               help="A copy of the source distribution, instead of the package index.")  # fmt: skip
 @_out
 def fetch(source: Path | None, out: Path | None) -> None:
-    """Fetch the published games once and convert them; nothing in the download is executed."""
+    """Fetch the published games once.
+
+    They come from the package index, are checked and converted; nothing in the download is executed.
+    """
     from legible_envs.overcooked.recordings import fetch_recordings
 
     click.echo(f"recordings: {fetch_recordings(out, source=source)}")
@@ -211,7 +234,10 @@ def stats(folder: Path | None) -> None:
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 @click.option("--offline", is_flag=True, help="Do not fetch recorded play.")
 def demo(out: Path, seed: int, offline: bool) -> None:
-    """Search a legible kitchen, compare it with others, and read recorded people; under a minute."""
+    """Show the main job in a minute.
+
+    Searches a legible kitchen, compares it with a random and an efficient one, and reads recorded people.
+    """
     from benchmarks.console import say
     from benchmarks.demo import run_demo
 

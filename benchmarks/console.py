@@ -78,12 +78,12 @@ def boards(console: Console, conditions: Sequence[Condition]) -> Table:
     return grid
 
 
-def table(rows: Sequence[dict[str, Any]], *, title: str | None = None) -> Table:
+def table(rows: Sequence[dict[str, Any]]) -> Table:
     """A table of rows that share their keys; numbers to the right."""
     from rich import box
     from rich.table import Table
 
-    shown = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+    shown = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for name in rows[0] if rows else ():
         numeric = all(isinstance(row[name], int | float) for row in rows)
         shown.add_column(name.replace("_", " "), justify="right" if numeric else "left")

@@ -81,7 +81,8 @@ def run_demo(
     console.print()
     if people.get("table"):
         rows_of_table = [dict(zip(people["table"]["columns"], row, strict=True)) for row in people["table"]["rows"]]
-        console.print(table(rows_of_table, title="Recorded people: goals read correctly"))
+        console.print("Recorded people: goals read correctly", style="bold")
+        console.print(table(rows_of_table))
     console.print(people["note"], style="dim")
     console.print(f"\npicture {image}\nreport  {page}")
     return page

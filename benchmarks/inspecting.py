@@ -7,18 +7,20 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from benchmarks.console import board_for, number, table
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.table import Table
 
     from benchmarks.kitchens import Kitchen
+    from legible_envs.rollouts import Trajectory
 
-__all__ = ["score_lines", "show_kitchen", "trajectory_table"]
+__all__ = ["read_people", "score_lines", "show_kitchen"]
 
-WORST_ROWS = 10
-"""Rows of the table of losses that the terminal shows."""
+WORST_ROWS, BEST_ROWS = 10, 3
+"""Rows of the tables of losses and gains that the terminal shows."""
 
 
 def score_lines(kitchen: Kitchen) -> list[str]:
@@ -53,16 +55,15 @@ def show_kitchen(console: Console, kitchen: Kitchen, picture: Path | None) -> No
     lines = "\n".join(score_lines(kitchen))
     console.print(Columns([board_for(console, kitchen.layout), lines], padding=(1, 4)))
     rows = kitchen.explain()
-    shown = rows[:WORST_ROWS]
-    console.print()
-    console.print(
-        table([_loss_row(row) for row in shown], title="Reaches that lose most (contributions sum to the score)")
-    )
-    if len(rows) > len(shown):
-        rest = math.fsum(row["contribution"] for row in rows[len(shown) :])
-        console.print(f"and {len(rows) - len(shown)} more reaches, together {number(rest)}", style="dim")
-    console.print()
-    console.print(table([_loss_row(row) for row in rows[-3:][::-1]], title="Reaches that win most"))
+    worst, best = rows[:WORST_ROWS], rows[WORST_ROWS:][: -BEST_ROWS - 1 : -1]
+    console.print("\nReaches that lose most (contributions sum to the score)", style="bold")
+    console.print(table([_loss_row(row) for row in worst]))
+    if rest := rows[WORST_ROWS : len(rows) - len(best)]:
+        total = math.fsum(row["contribution"] for row in rest)
+        console.print(f"and {len(rest)} more reaches, together {number(total)}", style="dim")
+    if best:
+        console.print("\nReaches that win most", style="bold")
+        console.print(table([_loss_row(row) for row in best]))
     if picture is None:
         console.print("where goals are confused, as a picture: add --out FILE.png", style="dim")
     else:
@@ -92,8 +93,8 @@ def write_ambiguity(kitchen: Kitchen, path: Path) -> None:
     save_png(path, draw_ambiguity(kitchen.layout, heat, tile=72, title="Where goals are confused"))
 
 
-def trajectory_table(kitchen: Kitchen, trajectories: Path) -> Table:
-    """How well the heuristic and Eq. 1 read recorded walks in this kitchen, by share observed.
+def read_people(console: Console, kitchen: Kitchen, trajectories: Path) -> None:
+    """Print how well the heuristic and Eq. 1 read recorded walks in this kitchen, by share observed.
 
     Raises:
         ValueError: The file holds no walks, or none of this kitchen.
@@ -101,7 +102,7 @@ def trajectory_table(kitchen: Kitchen, trajectories: Path) -> Table:
     from legible_envs.rollouts import load_trajectories
     from predictors import BayesianGoalPredictor, ShortestDistance
 
-    walks = [walk for walk in load_trajectories(trajectories) if walk.layout == kitchen.layout]
+    walks = [walk for walk in load_trajectories(trajectories) if _same_cells(walk, kitchen)]
     if not walks:
         raise ValueError(f"{trajectories} has no walk recorded in this kitchen (layout id {kitchen.layout.layout_id})")
     fractions = (0.1, 0.3, 0.5, 0.7, 0.9)
@@ -110,4 +111,10 @@ def trajectory_table(kitchen: Kitchen, trajectories: Path) -> Table:
         predictor.fit(walks)
         scores = [predictor.score(walks, fractions=(fraction,)) for fraction in fractions]
         rows.append({"predictor": name, **{f"{f:.0%}": s for f, s in zip(fractions, scores, strict=True)}})
-    return table(rows, title=f"{len(walks):,} walks: goals read correctly, by share of the walk observed")
+    console.print(f"\n{len(walks):,} walks: goals read correctly, by share of the walk observed", style="bold")
+    console.print(table(rows))
+
+
+def _same_cells(walk: Trajectory, kitchen: Kitchen) -> bool:
+    """Whether a walk was recorded in this kitchen, wherever players started."""
+    return walk.layout is not None and bool(np.array_equal(walk.layout.cells, kitchen.layout.cells))

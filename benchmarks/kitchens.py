@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from benchmarks.runs import is_run_folder, read_run
 from legible_envs.errors import LayoutError
-from legible_envs.overcooked.layout import INGREDIENTS, OvercookedLayout
+from legible_envs.overcooked.layout import OvercookedLayout
 
 if TYPE_CHECKING:
     from legible_envs.overcooked.recipes import Recipe
@@ -72,17 +72,11 @@ class Kitchen:
     @property
     def soups(self) -> tuple[Recipe, ...]:
         """The soups that the scored task cooks."""
-        return _soups_for(self.layout) if self.genome is None else tuple(self.workspace.recipes)
+        if self.genome is not None:
+            return tuple(self.workspace.recipes)
+        from legible_envs.overcooked.play import recipes_for
 
-
-def _soups_for(layout: OvercookedLayout) -> tuple[Recipe, ...]:
-    """The paper's soups; where the kitchen lacks one of their ingredients, a soup of three of each it has."""
-    from legible_envs.overcooked.recipes import PAPER_SOUPS
-
-    present = [kind for kind in INGREDIENTS if layout.named(kind)]
-    if not present or {ingredient for soup in PAPER_SOUPS for ingredient in soup} <= set(present):
-        return PAPER_SOUPS
-    return tuple((kind,) * 3 for kind in present)
+        return recipes_for(self.layout)
 
 
 def load_kitchen(source: str, *, prefix: str | None = None, pots: int | None = None) -> Kitchen:

@@ -233,6 +233,24 @@ def test_traceback_on_request(tmp_path: Path) -> None:
     assert isinstance(result.exception, FileNotFoundError)
 
 
+def test_score_reads_recorded_walks_of_the_kitchen(tmp_path: Path) -> None:
+    from legible_envs.overcooked import OvercookedLayout
+    from legible_envs.rollouts import Trajectory, save_trajectories
+    from predictors import BayesianGoalPredictor
+
+    layout, other = OvercookedLayout.from_ascii(KITCHEN), OvercookedLayout.from_ascii(KITCHEN.replace("V", " "))
+    cells = [(5, 4), (5, 5), (4, 5), (4, 6)]
+    walk = Trajectory(cells, start="serving", goal="fish", candidates=("fish", "tomato"), layout=layout)
+    away = Trajectory(cells, start="serving", goal="fish", candidates=("fish", "tomato"), layout=other)
+    save_trajectories(tmp_path / "walks.npz", [walk, away, walk])
+    result = legible("score", "-", "--trajectories", tmp_path / "walks.npz", text=KITCHEN)
+    assert result.exit_code == 0, result.output
+    assert "2 walks" in result.output
+    expected = BayesianGoalPredictor().fit([walk]).score([walk], fractions=(0.5,))
+    row = next(line for line in result.output.splitlines() if line.strip().startswith("Eq. 1")).split()
+    assert float(row[4]) == pytest.approx(expected, abs=1e-3)
+
+
 def test_trajectories_of_another_kitchen_are_refused(tmp_path: Path) -> None:
     from legible_envs.rollouts import save_trajectories
 
