@@ -15,6 +15,9 @@ import numpy as np
 import pytest
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import check_env, data_equivalence
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import array_shapes, arrays
 from kitchen_oracle import any_kitchen
 
 import legible_envs  # noqa: F401
@@ -23,6 +26,7 @@ from legible_envs.overcooked import PAPER_SOUPS, OvercookedLayout, OvercookedWor
 from legible_envs.overcooked.env import OvercookedEnv
 from legible_envs.overcooked.observations import GRID_CHANNELS, NUM_FEATURES
 from legible_envs.overcooked.policies import ScriptedPlayer
+from legible_envs.overcooked.settings import read_layout
 
 NAME = "LegibleOvercooked-v0"
 IDS = sorted(name for name, spec in gym.registry.items() if str(spec.entry_point).startswith("legible_envs."))
@@ -289,6 +293,44 @@ def test_bad_kitchens_are_named_and_change_nothing(case):
         gym.make(NAME, layout=bad)
     assert data_equivalence(env.step(1), twin.step(1), exact=True)
     assert env.reset()[1]["layout_id"] == twin.reset()[1]["layout_id"]
+
+
+SCRAPS = st.one_of(st.none(), st.integers(-3, 2**70), st.floats(), st.text("XVTOCFDPS12 ?", max_size=3), st.binary())
+NESTED = st.recursive(
+    SCRAPS, lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(), inner), max_leaves=12
+)
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    st.one_of(
+        NESTED,
+        st.text("XVTOCFDPS12 \n", max_size=60),
+        st.lists(st.text("XTOCFDPS ", min_size=7, max_size=7), min_size=7, max_size=7),
+        arrays(np.int8, array_shapes(max_dims=3, max_side=8)),
+        arrays(np.int8, 32, elements=st.integers(-1, 20)),
+        arrays(np.float64, array_shapes(max_dims=2)),
+    )
+)
+def test_anything_is_a_kitchen_or_a_layout_error(value):
+    try:
+        layout = read_layout(value, (7, 7))
+    except LayoutError:
+        return
+    assert layout.shape == (7, 7)
+
+
+def test_overcooked_ai_layouts_can_be_played():
+    """Cramped Room, as in Overcooked-AI's layout files: two starts, two onion stations, no tomatoes."""
+    layout = OvercookedLayout.from_overcooked_ai("XXPXX\nO  2O\nX1  X\nXDXSX")
+    env = gym.make(NAME, shape=layout.shape, layout=layout, recipes=[["onion"] * 3] * 2)
+    player = ScriptedPlayer(env, np.random.default_rng(0))
+    obs, info = env.reset(seed=0)
+    assert env.unwrapped.valid_goal_names() == ("onion@(1,0)", "onion@(1,4)")
+    over = False
+    while not over:
+        obs, _, over, _, info = env.step(player(obs, info))
+    assert info["deliveries"] == 2
 
 
 def test_unknown_options_and_arguments():

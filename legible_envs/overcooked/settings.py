@@ -77,7 +77,10 @@ def read_layout(value: Any, shape: tuple[int, int]) -> OvercookedLayout:
 def _read_array(value: Any, shape: tuple[int, int]) -> OvercookedLayout:
     first = value[0]
     if isinstance(first, Sequence) and first and isinstance(first[0], str):
-        return OvercookedLayout.from_rows(value)
+        try:
+            return OvercookedLayout.from_rows(value)
+        except TypeError as error:
+            raise LayoutError(f"nested lists must hold rows of one-character symbols: {error}", rule="type") from error
     try:
         array = np.asarray(value)
     except ValueError as error:
