@@ -8,7 +8,9 @@ import os
 import pickle
 import subprocess
 import sys
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 import numpy as np
@@ -193,6 +195,22 @@ def test_no_network_is_said_in_words() -> None:
     with pytest.raises(RecordingsError, match=r"could not get overcooked_ai-1\.1\.0\.tar\.gz.*--from FILE") as caught:
         download_archive(["http://user:secret@127.0.0.1:9/simple/"])
     assert "secret" not in str(caught.value)
+
+
+@pytest.mark.parametrize("status", [404, 503])
+def test_an_index_without_the_package_is_named(status: int) -> None:
+    class Refusing(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            self.send_error(status)
+
+        def log_message(self, *args: Any) -> None:
+            pass
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), Refusing) as server:
+        Thread(target=server.serve_forever, daemon=True).start()
+        with pytest.raises(RecordingsError, match=rf"127\.0\.0\.1:{server.server_port}.*{status}.*--from FILE"):
+            download_archive([f"http://127.0.0.1:{server.server_port}/simple/"])
+        server.shutdown()
 
 
 def test_settings_are_those_of_pip(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

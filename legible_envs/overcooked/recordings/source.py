@@ -9,12 +9,14 @@ from __future__ import annotations
 import ast
 import hashlib
 import io
+import logging
 import os
 import ssl
 import subprocess
 import sys
 import tarfile
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -197,18 +199,36 @@ def _find_links(settings: PipSettings, session: Any) -> tuple[list[Any], list[st
     """Links to the file, those whose index vouches for the hash first, and what went wrong on the way."""
     from unearth import Link, PackageFinder
 
-    links, problems = [], []
+    links: list[Any] = []
+    problems: list[str] = []
     sources = [{"index_urls": [url]} for url in settings.index_urls]
     sources += [{"find_links": [_as_url(place)]} for place in settings.find_links]
     for source in sources:
         # One finder each: an index that is down must not hide the others.
         finder = PackageFinder(session=session, no_binary=[PACKAGE], ignore_compatibility=True, **source)
         try:
-            found = finder.find_all_packages(PACKAGE, allow_yanked=True)
+            with _listening(problems):
+                found = list(finder.find_all_packages(PACKAGE, allow_yanked=True))
             links += [package.link for package in found if package.link.filename == FILE_NAME]
         except Exception as error:  # any transport error; the message is reported if nothing else works
             problems.append(f"{Link(next(iter(source.values()))[0]).redacted}: {_short(error)}")
     return sorted(links, key=lambda link: (link.hashes or {}).get("sha256") != SHA256), problems
+
+
+@contextmanager
+def _listening(problems: list[str]) -> Iterator[None]:
+    """Collect what the finder only logs, such as an index that does not know the package."""
+
+    class Collector(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            problems.append(" ".join(record.getMessage().split()))
+
+    logger, collector = logging.getLogger("unearth"), Collector(logging.WARNING)
+    logger.addHandler(collector)
+    try:
+        yield
+    finally:
+        logger.removeHandler(collector)
 
 
 def _as_url(place: str) -> str:
