@@ -166,6 +166,13 @@ def test_text():
     assert any(line.startswith("step 1,") for line in lines)
 
 
+def test_rendering_without_a_mode_warns():
+    env = OvercookedEnv()
+    env.reset(seed=0)
+    with pytest.warns(UserWarning, match="render_mode"):
+        assert env.render() is None
+
+
 def test_keys_reach_every_action():
     keys = gym.make(NAME).get_wrapper_attr("get_keys_to_action")()
     assert set(keys.values()) == {0, 1, 2, 3, 5}

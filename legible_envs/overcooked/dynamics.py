@@ -9,6 +9,8 @@ A pot accepts an ingredient if afterwards every unfinished pot can still be comp
 soups on the fire, in hands or on counters are taken): two pots never commit to one order. It starts by itself when it
 holds a whole recipe. With ``put_back`` no state is a dead end for a single player: hands can always be emptied where
 they were filled, accepted ingredients and soups are always of use, and soups on counters can be picked up again.
+What remains: several players can stand in each other's way for ever, or, in a kitchen divided by counters, fill all
+counters over which they hand things to each other with things that only the other side could use up.
 """
 
 from __future__ import annotations

@@ -260,10 +260,10 @@ class OvercookedEnv(JsonSpec, gym.Env[npt.NDArray[Any], Any]):
         The picture is made by :func:`~legible_envs.overcooked.rendering.draw_game`.
         """
         if self.render_mode is None:
-            assert self.spec is not None
+            name = self.spec.id if self.spec is not None else type(self).__name__
             gym.logger.warn(
                 "You are calling render method without specifying any render mode. You can specify the render_mode at "
-                f'initialization, e.g. gym.make("{self.spec.id}", render_mode="rgb_array")'
+                f'initialization, e.g. gym.make("{name}", render_mode="rgb_array")'
             )
             return None
         if self.render_mode == "ansi":
