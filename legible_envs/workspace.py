@@ -6,16 +6,16 @@ workspaces subclass it and register under the entry point group ``legible.worksp
 
 from __future__ import annotations
 
-import importlib
 import inspect
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from importlib.metadata import entry_points
 from typing import Any, ClassVar, Final, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
+
+from legible_envs.plugins import Registry
 
 __all__ = ["Objective", "ObjectiveName", "Workspace", "make_workspace", "register_workspace"]
 
@@ -265,19 +265,26 @@ class Objective:
         return f"{type(self.workspace).__name__}.objective({self.name!r}{cap})"
 
 
-_BUILT_IN: Final[Mapping[str, str]] = {"overcooked": "legible_envs.overcooked.workspace:OvercookedWorkspace"}
-_registered: dict[str, type[Workspace] | str] = {}
-ENTRY_POINT_GROUP: Final = "legible.workspaces"
+_registry = Registry(
+    "workspace",
+    "legible.workspaces",
+    {"overcooked": "legible_envs.overcooked.workspace:OvercookedWorkspace"},
+    ValueError,
+)
 
 
-def register_workspace(name: str, workspace: type[Workspace] | str) -> None:
+def register_workspace(name: str, workspace: type[Workspace], *, overwrite: bool = False) -> None:
     """Make a workspace class known by name, for this process.
 
     Args:
         name: The name configurations use under ``"workspace"``.
-        workspace: The class, or ``"module:Class"``.
+        workspace: The class.
+        overwrite: Whether an earlier registration of that name may be replaced.
+
+    Raises:
+        ValueError: The name is taken or not a name.
     """
-    _registered[name] = workspace
+    _registry.register(name, workspace, overwrite=overwrite)
 
 
 def make_workspace(config: Mapping[str, Any] | str, **settings: Any) -> Workspace:
@@ -296,33 +303,14 @@ def make_workspace(config: Mapping[str, Any] | str, **settings: Any) -> Workspac
     name = merged.pop("workspace", None)
     if not isinstance(name, str):
         raise ValueError("a workspace configuration needs the key 'workspace', e.g. {'workspace': 'overcooked'}")
-    cls = _find(name)
+    cls = _registry.resolve(name)
+    if not (isinstance(cls, type) and issubclass(cls, Workspace)):
+        raise ValueError(f"workspace {name!r} is {cls!r}, which is not a subclass of Workspace")
     known = inspect.signature(cls).parameters
     unknown = [key for key in merged if key not in known]
     if unknown:
         raise ValueError(f"unknown settings {unknown} of workspace {name!r}; it takes {list(known)}")
     return cls(**merged)
-
-
-def _find(name: str) -> type[Workspace]:
-    target: type[Workspace] | str | None = _registered.get(name) or _BUILT_IN.get(name)
-    if target is None and ":" in name:
-        target = name
-    if target is None:
-        found = {point.name: point for point in entry_points(group=ENTRY_POINT_GROUP)}
-        if name not in found:
-            known = sorted({*_BUILT_IN, *_registered, *found})
-            raise ValueError(f"unknown workspace {name!r}; known: {known}, or 'module:Class'")
-        target = found[name].load()
-    if isinstance(target, str):
-        module, _, attribute = target.partition(":")
-        try:
-            target = getattr(importlib.import_module(module), attribute)
-        except (ImportError, AttributeError) as error:
-            raise ValueError(f"cannot load workspace {target!r}: {error}") from error
-    if not (isinstance(target, type) and issubclass(target, Workspace)):
-        raise ValueError(f"workspace {name!r} is {target!r}, which is not a subclass of Workspace")
-    return target
 
 
 def as_batch(genomes: npt.ArrayLike, size: int) -> npt.NDArray[Any]:

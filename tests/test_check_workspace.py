@@ -71,7 +71,7 @@ class Failing(OvercookedWorkspace):
     ],
 )
 def test_what_is_wrong_is_said(cls, arguments, problem):
-    register_workspace("forgetful", Forgetful)
+    register_workspace("forgetful", Forgetful, overwrite=True)
     with pytest.raises(WorkspaceError, match=problem) as caught:
         check_workspace(cls(**arguments))
     assert caught.value.problems

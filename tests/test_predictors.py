@@ -18,6 +18,7 @@ import predictors.registry as registry
 from benchmarks.human_play import PREDICTORS, accuracy_table, score_recorded_play
 from benchmarks.human_play.run import score_every_walk
 from benchmarks.human_play.sweep import LAYOUTS
+from legible_envs import plugins
 from legible_envs.errors import LayoutError
 from legible_envs.legibility import optimal_costs, posterior
 from legible_envs.overcooked import OvercookedLayout
@@ -361,7 +362,7 @@ def test_the_check_says_what_is_wrong() -> None:
 
 
 def test_predictors_are_found_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(registry, "_REGISTERED", {})
+    monkeypatch.setattr(registry._registry, "_registered", {})
     assert isinstance(make_predictor("bayesian", beta=2.0), BayesianGoalPredictor)
     assert make_predictor("shortest-distance", metric="geodesic").get_params() == {"metric": "geodesic"}
     assert isinstance(make_predictor("predictors:ShortestDistance"), ShortestDistance)
@@ -371,7 +372,7 @@ def test_predictors_are_found_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
     assert isinstance(make_predictor("smallest"), Smallest)
     point = EntryPoint("outside", "predictors.grid.bayesian:BayesianGoalPredictor", registry.ENTRY_POINT_GROUP)
     broken = EntryPoint("broken", "no_such_module:Thing", registry.ENTRY_POINT_GROUP)
-    monkeypatch.setattr(registry, "entry_points", lambda group: [point, broken])
+    monkeypatch.setattr(plugins, "entry_points", lambda group: [point, broken])
     assert isinstance(make_predictor("outside"), BayesianGoalPredictor)
     known = list_predictors()
     assert {"bayesian", "shortest-distance", "smallest", "outside", "broken"} == set(known)

@@ -328,11 +328,11 @@ def test_workspaces_by_name():
     register_workspace("tiny", Tiny)
     assert isinstance(make_workspace({"workspace": "tiny"}), Tiny)
     for bad, message in [
-        ("nowhere", "unknown workspace"),
+        ("nowhere", "no workspace named"),
         ({"workspace": "overcooked", "colour": 1}, "unknown settings"),
         ({}, "needs the key"),
         ("json:dumps", "not a subclass"),
-        ("no.such.module:Thing", "cannot load"),
+        ("no.such.module:Thing", "cannot be imported"),
     ]:
         with pytest.raises(ValueError, match=message):
             make_workspace(bad)

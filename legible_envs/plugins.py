@@ -1,0 +1,122 @@
+"""Finding what others plug in: by registered name, by an installed package's entry point, or as ``module:Class``."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any
+
+__all__ = ["Plugin", "Registry", "target_of"]
+
+
+@dataclass(frozen=True, slots=True)
+class Plugin:
+    """Something that can be used by name.
+
+    Attributes:
+        name: What to call it by.
+        origin: ``"built in"``, ``"registered"``, or ``"entry point of PACKAGE VERSION"``.
+        target: Where it is defined, ``module:Name``.
+        factory: The object itself where it was registered, else None.
+    """
+
+    name: str
+    origin: str
+    target: str
+    factory: Callable[..., Any] | None = None
+
+    def summary(self) -> str:
+        """First line of its documentation; imports it. Says why where it cannot be imported."""
+        try:
+            found = self.factory or import_target(self.target)
+        except (ImportError, AttributeError, ValueError) as error:
+            return f"cannot be used: {error}"
+        return (inspect.getdoc(found) or "").strip().split("\n")[0]
+
+
+class Registry:
+    """Names of one kind of plug-in.
+
+    Args:
+        kind: What a plug-in is, for messages: ``"emitter"``.
+        group: Entry point group of installed plug-ins.
+        built_in: ``{name: "module:Name"}`` of those that come with the project.
+        error: Exception raised for everything that is wrong.
+    """
+
+    def __init__(self, kind: str, group: str, built_in: Mapping[str, str], error: type[Exception]) -> None:
+        self.kind = kind
+        self.group = group
+        self.error = error
+        self._built_in = dict(built_in)
+        self._registered: dict[str, Callable[..., Any]] = {}
+
+    def register(self, name: str, factory: Callable[..., Any], *, overwrite: bool = False) -> None:
+        """Make a plug-in available by name for the rest of this process.
+
+        Built-in names are never replaced, others only with ``overwrite``.
+        """
+        if not isinstance(name, str) or not name or ":" in name:
+            raise self.error(f"the name of a {self.kind} must be a non-empty string without ':', got {name!r}")
+        if not callable(factory):
+            raise self.error(f"{self.kind} {name!r}: the factory must be callable, got {type(factory).__name__}")
+        if name in self._built_in:
+            raise self.error(f"the {self.kind} name {name!r} is built in; choose another")
+        if name in self._registered and not overwrite:
+            raise self.error(f"the {self.kind} name {name!r} is taken; choose another or pass overwrite=True")
+        self._registered[name] = factory
+
+    def list(self) -> dict[str, Plugin]:
+        """Every plug-in known by name: built in, installed as an entry point, and registered in this process."""
+        found = {name: Plugin(name, "built in", target) for name, target in self._built_in.items()}
+        for name, point in sorted(self._installed().items()):
+            package = f"{point.dist.name} {point.dist.version}" if point.dist is not None else "an unknown package"
+            found.setdefault(name, Plugin(name, f"entry point of {package}", point.value))
+        for name, factory in self._registered.items():
+            found[name] = Plugin(name, "registered", target_of(factory), factory)
+        return found
+
+    def resolve(self, spec: str | Callable[..., Any]) -> Callable[..., Any]:
+        """Find a factory by name or ``"module:Name"``, or return the callable given."""
+        if not isinstance(spec, str):
+            if callable(spec):
+                return spec
+            raise self.error(f"a {self.kind} is a name, 'module:Class' or a callable, got {type(spec).__name__}")
+        if spec in self._registered:
+            return self._registered[spec]
+        target = self._built_in.get(spec)
+        if target is None:
+            installed = self._installed().get(spec)
+            target = installed.value if installed else spec
+        if ":" not in target:
+            known = ", ".join(sorted(self.list()))
+            raise self.error(f"no {self.kind} named {spec!r}; known: {known}; or use 'module:Class'")
+        try:
+            found = import_target(target)
+        except (ImportError, AttributeError, ValueError) as error:
+            where = "" if spec == target else f" ({target})"
+            raise self.error(f"{self.kind} {spec!r}{where} cannot be imported: {error}") from error
+        if not callable(found):
+            raise self.error(f"{self.kind} {spec!r} is not a class or function but a {type(found).__name__}")
+        return found  # type: ignore[no-any-return]
+
+    def _installed(self) -> dict[str, EntryPoint]:
+        return {point.name: point for point in entry_points(group=self.group)}
+
+
+def target_of(factory: Any) -> str:
+    """Where a class, function or instance's class is defined: ``module:Name``."""
+    named = factory if hasattr(factory, "__qualname__") else type(factory)
+    return f"{named.__module__}:{named.__qualname__}"
+
+
+def import_target(target: str) -> Any:
+    """Import what ``"module:Name"`` names."""
+    module, _, name = target.partition(":")
+    found: Any = import_module(module)
+    for part in name.split("."):
+        found = getattr(found, part)
+    return found
