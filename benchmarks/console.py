@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
 __all__ = ["board", "board_for", "boards", "number", "say", "table"]
 
-_PLAIN = {"X": "##", "V": "//", " ": "  "}
-_FANCY = {"X": "▒▒", "V": "▞▞", " ": "  "}
+_PLAIN = {"X": "##", "V": "[]", " ": "  "}
+_FANCY = {"X": "▒▒", "V": "[]", " ": "  "}
 
 
 def say() -> Console:
@@ -42,11 +42,10 @@ def board(layout: OvercookedLayout, *, fancy: bool = True) -> Text:
     styles = {
         " ": f"on {PALETTE['floor']}",
         "X": f"{PALETTE['counter_line']} on {PALETTE['counter']}",
-        "V": f"{PALETTE['obstacle_edge']} on {PALETTE['obstacle']}",
+        "V": f"bold {PALETTE['obstacle_edge']} on {PALETTE['obstacle']}",
     }
-    for kind in STATION_TYPES:
-        ink = "#ffffff" if kind in ("tomato", "pot", "serving", "fish") else "#2b1a10"
-        styles[SYMBOLS[3 + STATION_TYPES.index(kind)]] = f"bold {ink} on {PALETTE[kind]}"
+    for number, kind in enumerate(STATION_TYPES):
+        styles[SYMBOLS[3 + number]] = f"bold {_ink(PALETTE[kind])} on {PALETTE[kind]}"
     glyphs = _FANCY if fancy else _PLAIN
     text = Text(no_wrap=True)
     for i, row in enumerate(layout.cells):
@@ -55,6 +54,12 @@ def board(layout: OvercookedLayout, *, fancy: bool = True) -> Text:
             symbol = SYMBOLS[code]
             text.append(glyphs.get(symbol, f" {symbol}"), style=styles[symbol])
     return text
+
+
+def _ink(ground: str) -> str:
+    """Black or white, whichever can be read on a ``#rrggbb`` ground."""
+    red, green, blue = (int(ground[i : i + 2], 16) for i in (1, 3, 5))
+    return "#1d120a" if 0.299 * red + 0.587 * green + 0.114 * blue > 130 else "#ffffff"
 
 
 def board_for(console: Console, layout: OvercookedLayout) -> Text:
@@ -71,6 +76,7 @@ def boards(console: Console, conditions: Sequence[Condition]) -> Table:
     for _ in conditions:
         grid.add_column(max_width=32)
     grid.add_row(*(board_for(console, c.layout) for c in conditions))
+    grid.add_row()
     grid.add_row(*(Text(c.name, style="bold") for c in conditions))
     grid.add_row(*(f"legibility [bold cyan]{number(c.score)}[/]" for c in conditions))
     grid.add_row(*(f"distance   [bold]{number(c.distance, 1)}[/]" for c in conditions))

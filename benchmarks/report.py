@@ -264,11 +264,15 @@ _WANTED = {"legibility": "legible", "efficiency": "efficient", "legible-efficien
 def _lede(data: dict[str, Any]) -> str:
     """What was found, in two sentences."""
     best, conditions = data["best"], {c["name"]: c for c in data["conditions"]}
-    text = f"The best kitchen found scores {_number(best.get('score'))} in legibility"
-    bounded = data["config"]["workspace"].get("prefix") != "sum"
-    if bounded and (best.get("normalised") or -1) > 0:
-        text += f", {_number(100 * best['normalised'], 0)} % of the highest conceivable score"
-    text += f", and its task takes {_number(best.get('distance'), 1)} steps on average."
+    score, steps = _number(best.get("score")), _number(best.get("distance"), 1)
+    if data["objective"]["name"] == "efficiency":
+        text = f"The task of the best kitchen found takes {steps} steps on average; its legibility is {score}."
+    else:
+        text = f"The best kitchen found scores {score} in legibility"
+        bounded = data["config"]["workspace"].get("prefix") != "sum"
+        if bounded and (best.get("normalised") or -1) > 0:
+            text += f", {_number(100 * best['normalised'], 0)} % of the highest conceivable score"
+        text += f", and its task takes {steps} steps on average."
     if "random" in conditions:
         other = conditions["random"]
         text += (

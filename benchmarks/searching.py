@@ -92,6 +92,8 @@ def run_search(
     except SearchInterrupted as stop:
         done = 0 if stop.partial is None else stop.partial.evaluations
         click.echo(f"stopped after {done:,} evaluations; everything is saved in {out}", err=True)
+        if stop.partial is not None and stop.partial.best_genome is not None:
+            _pictures(out)
         click.echo(f"to go on: legible optimize {domain} --resume --out {shlex.quote(str(out))}", err=True)
         raise click.exceptions.Exit(130) from None
     _tell(result, out)
@@ -102,9 +104,8 @@ def _tell(result: SearchResult, out: Path) -> None:
         click.echo(f"no layout scored in {result.evaluations:,} evaluations; is --max-distance too low?", err=True)
         raise click.exceptions.Exit(1)
     from benchmarks.console import board_for, say
-    from benchmarks.report import write_best_image, write_report
 
-    image, page = write_best_image(out), write_report(out)
+    image, page = _pictures(out)
     console = say()
     console.print(board_for(console, result.best_layout))
     summary = result.workspace.summary(result.best_genome)
@@ -114,6 +115,12 @@ def _tell(result: SearchResult, out: Path) -> None:
         f"after {result.evaluations:,} evaluations in {result.seconds:.1f} s"
     )
     console.print(f"picture {image}\nreport  {page}")
+
+
+def _pictures(out: Path) -> tuple[Path, Path]:
+    from benchmarks.report import write_best_image, write_report
+
+    return write_best_image(out), write_report(out)
 
 
 def emitter_rows() -> list[dict[str, Any]]:
