@@ -23,12 +23,12 @@ def draws(distribution, seed, count=50):
     return [distribution.sample(rng) for _ in range(count)]
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(st.integers(0, 2**32), st.floats(0.1, 0.9), st.integers(0, 1000))
 def test_train_and_test_kitchens_never_meet(seed, fraction, split_seed):
     train, test = RandomLayouts((5, 5), split_seed=split_seed).split(fraction)
-    assert not {k.layout_id for k in draws(train, seed)} & {k.layout_id for k in draws(test, seed)}
-    assert all(not train.is_test(kitchen) for kitchen in draws(train, seed))
+    assert not {k.layout_id for k in draws(train, seed, 20)} & {k.layout_id for k in draws(test, seed, 20)}
+    assert all(not train.is_test(kitchen) for kitchen in draws(train, seed, 20))
 
 
 def test_the_split_has_the_size_asked_for():

@@ -49,7 +49,7 @@ RECIPE_BOOKS = {
 def test_kernels_play_like_the_plain_game(book, players, soft):
     rng = np.random.default_rng([players, soft, sorted(RECIPE_BOOKS).index(book)])
     interactions = deliveries = 0
-    for _ in range(4):
+    for _ in range(3):
         layout = any_kitchen(rng, players, soft=soft)
         arguments = {"recipes": RECIPE_BOOKS[book], "cook_time": 3, "soft": soft, "players": players}
         oracle, game = OracleGame(layout, **arguments), KernelGame(layout, **arguments)

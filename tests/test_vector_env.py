@@ -85,9 +85,9 @@ def test_same_trajectories_as_sync(mode, setting):
     obs, infos = ours.reset(seed=3)
     assert_all_same((obs, infos), theirs.reset(seed=3))
     deliveries = truncated = terminated = 0
-    for step in range(700):
+    for step in range(460):
         actions = np.where(rng.random(COUNT) < 0.15, rng.integers(6, size=COUNT), player(obs, infos))
-        if step == 250 and "layouts" not in SETTINGS[setting]:
+        if step == 160 and "layouts" not in SETTINGS[setting]:
             layouts = [[TWO_POTS, None, TWO_POTS.replace("P", "X", 1)][i % 3] for i in range(COUNT)]
             ours.set_attr("layout", layouts)
             theirs.set_attr("layout", layouts)
