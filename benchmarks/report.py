@@ -338,9 +338,11 @@ def _words(value: Any) -> str:
 
 def _date(text: Any) -> str:
     try:
-        return datetime.fromisoformat(str(text)).strftime("%-d %B %Y, %H:%M")
+        moment = datetime.fromisoformat(str(text))
     except ValueError:
         return ""
+    zone = f" {moment.tzname()}" if moment.tzname() else ""
+    return f"{moment.day} {moment:%B %Y, %H:%M}{zone}"
 
 
 def _number(value: Any, digits: int = 2) -> str:
