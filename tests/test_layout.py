@@ -115,6 +115,12 @@ def test_bad_drawings_name_row_column_and_rule(text, message, cell):
     assert (str(again), again.rule, again.cell) == (str(caught.value), caught.value.rule, cell)
 
 
+@pytest.mark.parametrize("rows", [[["X", ["a"], "X"]] * 3, [["X", 3, "X"]] * 3, [["X", "XX", "X"]] * 3, [[]], []])
+def test_bad_rows(rows):
+    with pytest.raises(LayoutError):
+        OvercookedLayout.from_rows(rows)
+
+
 def test_layouts_are_immutable():
     layout = OvercookedLayout.from_ascii(KITCHEN)
     with pytest.raises(AttributeError, match="immutable"):

@@ -146,9 +146,15 @@ class OvercookedLayout:
                     f"ragged drawing: row {r} has {len(line)} cells, row 0 has {width}", rule="ragged", cell=(r, 0)
                 )
             for c, symbol in enumerate(line):
+                if not isinstance(symbol, str):
+                    raise LayoutError(
+                        f"row {r}, column {c}: expected a one-character symbol, got {symbol!r}",
+                        rule="symbol",
+                        cell=(r, c),
+                    )
                 if symbol in _CODE_OF:
                     codes[r, c] = _CODE_OF[symbol]
-                elif isinstance(symbol, str) and len(symbol) == 1 and symbol in "123456789":
+                elif len(symbol) == 1 and symbol in "123456789":
                     number = int(symbol)
                     if number in starts:
                         raise LayoutError(
