@@ -34,13 +34,15 @@ class Progress:
 
             self._bar = RichProgress(
                 BarColumn(bar_width=None),
-                TextColumn("{task.percentage:3.0f}% of {task.total:,} {task.fields[unit]} {task.fields[status]}"),
+                TextColumn("{task.percentage:3.0f}%{task.fields[unit]} {task.fields[status]}"),
                 TimeRemainingColumn(compact=True),
                 console=Console(stderr=True),
                 refresh_per_second=5,
             )
             self._bar.start()
-            self._task = self._bar.add_task("search", total=self.total, unit=self.unit, status="")
+            self._task = self._bar.add_task(
+                "search", total=self.total, unit="" if self.unit == "evaluations" else f" of {self.unit}", status=""
+            )
         return self
 
     def __exit__(

@@ -159,7 +159,7 @@ def test_works_in_a_plain_pyribs_scheduler_from_an_empty_archive():
         first = scheduler.ask()
         assert first.dtype == np.int8
         assert workspace.valid(first).all()
-    assert len(first) == 8 * 32 + 20
+    assert len(first) == 8 * 24 + 20
 
 
 @pytest.mark.parametrize("bad", [{"climbs": 0}, {"fanout": 0}, {"initial": 0}, {"iterations": -1}])

@@ -269,7 +269,7 @@ def test_a_run_folder_holds_manifest_metrics_archive_and_drawing(tmp_path):
     assert config["workspace"] == workspace.to_config()
     assert config["objective"] == {"name": "legibility", "max_distance": 400.0}
     assert config["emitter"]["name"] == "improve"
-    assert config["emitter"]["settings"] == {"climbs": 2, "fanout": 32}
+    assert config["emitter"]["settings"] == {"climbs": 3, "fanout": 24}
     assert config["archive"]["dims"] == [13, 24]
     assert (config["seed"], config["evaluations"], config["initial"]) == (4, 3000, 1000)
     assert {"legible-envs", "ribs", "numpy", "python"} <= config["versions"].keys()

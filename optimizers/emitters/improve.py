@@ -54,7 +54,7 @@ class ImproveWorkspaceEmitter(EmitterBase):
         workspace: Any,
         *,
         climbs: int | None = None,
-        fanout: int = 32,
+        fanout: int = 24,
         iterations: int | None = None,
         evaluations: int | None = None,
         initial: int = 1000,
