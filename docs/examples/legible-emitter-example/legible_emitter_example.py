@@ -1,11 +1,4 @@
-"""Uniform crossover between elites: an emitter in a package of its own, found by its entry point.
-
-    pip install ./legible-emitter-example
-    python -c "
-    from optimizers import search
-    from legible_envs.overcooked import OvercookedWorkspace
-    print(search(OvercookedWorkspace(), emitter=['improve', 'crossover']).best_layout)"
-"""
+"""Uniform crossover between elites: an emitter in a package of its own, found by its entry point (see README.md)."""
 
 import numpy as np
 from ribs.emitters import EmitterBase
