@@ -62,7 +62,7 @@ _layout = click.argument("layout", metavar="LAYOUT")
 _pots = click.option("--pots", type=click.IntRange(min=1), help="Soups in progress at once. [default: no limit]")
 
 
-class _Prefix(click.ParamType[Any]):
+class _Prefix(click.ParamType):
     """``mean``, ``sum``, or fractions such as ``0.25,0.5``."""
 
     name = "mean|sum|fractions"
