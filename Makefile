@@ -56,7 +56,7 @@ format: $(VENV)/.test-installed
 
 # make bench   speed, as ratios within one run, with peers beside it
 bench: $(VENV)/.run-installed
-	$(BIN)/legible bench --peers
+	$(BIN)/legible bench --peers --out docs/benchmarks.md
 
 # make lock   pin the newest versions that fit pyproject.toml
 lock: | $(BIN)/python

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
@@ -19,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from benchmarks.runs import Run, read_run
+from legible_envs.files import write_atomically
 
 if TYPE_CHECKING:
     from legible_envs.overcooked.layout import OvercookedLayout
@@ -79,7 +79,8 @@ def write_report(
     """
     run = read_run(run_folder)
     path = run.folder / "report.html"
-    _write_atomically(path, _render(report_data(run, conditions, recorded_play)))
+    page = _render(report_data(run, conditions, recorded_play))
+    write_atomically(path, lambda stream: stream.write(page.encode()))
     return path
 
 
@@ -350,13 +351,3 @@ def _number(value: Any, digits: int = 2) -> str:
     if value is None:
         return "–"
     return f"{value:,.{digits}f}".replace("-", "\u2212").replace(",", "\u202f")
-
-
-def _write_atomically(path: Path, text: str) -> None:
-    """Write all or nothing: a full disk must not leave half a page in the place of a whole one."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        temporary.write_text(text, encoding="utf-8")
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)

@@ -1,21 +1,48 @@
-"""Writing files all or nothing."""
+"""Files that are either the old one or the new one, never half of each."""
 
 from __future__ import annotations
 
+import contextlib
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
-__all__ = ["write_npz"]
+__all__ = ["remove_leftovers", "write_atomically", "write_npz"]
+
+_MARK = ".part-"
+
+
+def write_atomically(path: Path, write: Callable[[BinaryIO], object]) -> None:
+    """Write a file so that a crash, a kill or a full disk at any moment leaves the previous one intact.
+
+    The bytes go to a temporary file in the same folder, are forced to the disk, and take the name in one step.
+
+    Args:
+        path: The file to write or replace.
+        write: Called with the open temporary file.
+
+    Raises:
+        OSError: The file could not be written; the temporary one is removed and ``path`` is as before.
+    """
+    temporary = path.with_name(f".{path.name}{_MARK}{os.getpid()}")
+    try:
+        with temporary.open("wb") as stream:
+            write(stream)
+            stream.flush()
+            os.fsync(stream.fileno())
+        os.replace(temporary, path)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            temporary.unlink()
+        raise
+    _sync_folder(path.parent)
 
 
 def write_npz(path: str | os.PathLike[str], arrays: Mapping[str, Any]) -> None:
-    """Write a compressed ``.npz`` without pickles beside its place, and move it there.
-
-    Nobody ever finds a half-written file, and a full disk loses nothing that was there before.
+    """Write a compressed ``.npz`` without pickles, all or nothing; folders that are missing are made.
 
     Raises:
         OSError: The folder cannot be made or written to.
@@ -23,13 +50,21 @@ def write_npz(path: str | os.PathLike[str], arrays: Mapping[str, Any]) -> None:
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.part-{os.getpid()}")
-    try:
-        with temporary.open("wb") as file:
-            np.savez_compressed(file, allow_pickle=False, **arrays)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
+    write_atomically(path, lambda stream: np.savez_compressed(stream, allow_pickle=False, **arrays))
+
+
+def remove_leftovers(folder: Path) -> None:
+    """Remove temporary files that a killed process left in a folder."""
+    for leftover in folder.glob(f".*{_MARK}*"):
+        with contextlib.suppress(OSError):
+            leftover.unlink()
+
+
+def _sync_folder(folder: Path) -> None:
+    """Make the new name itself durable; not every system lets a folder be synced."""
+    with contextlib.suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)

@@ -10,14 +10,17 @@ import inspect
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Any, ClassVar, Final, Literal, get_args
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from legible_envs.plugins import Registry
 
-__all__ = ["Objective", "ObjectiveName", "Workspace", "make_workspace", "register_workspace"]
+if TYPE_CHECKING:
+    from legible_envs.workspace_checks import check_workspace
+
+__all__ = ["Objective", "ObjectiveName", "Workspace", "check_workspace", "make_workspace", "register_workspace"]
 
 ObjectiveName = Literal["legibility", "efficiency", "legible-efficient"]
 Array = npt.NDArray[np.float64]

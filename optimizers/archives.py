@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from ribs.archives import GridArchive
 
-from optimizers.files import write_atomically
+from legible_envs.files import write_npz
 
 if TYPE_CHECKING:
     from ribs.archives import ArchiveBase
@@ -99,7 +99,7 @@ def archive_arrays(archive: ArchiveBase) -> dict[str, npt.NDArray[Any]]:
 def write_archive(path: Path, archive: ArchiveBase) -> None:
     """Write ``archive.npz``: plain arrays, no pickle, replaced in one step."""
     arrays: dict[str, Any] = archive_arrays(archive)
-    write_atomically(path, lambda stream: np.savez_compressed(stream, **arrays))
+    write_npz(path, arrays)
 
 
 def read_archive(path: Path) -> dict[str, npt.NDArray[Any]]:

@@ -19,8 +19,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from legible_envs.files import remove_leftovers, write_atomically
 from optimizers.errors import CheckpointError
-from optimizers.files import remove_leftovers, write_atomically
 
 __all__ = ["SCHEMA", "CheckpointFolder", "Header"]
 

@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 from ribs.schedulers import Scheduler
 
+from legible_envs.files import remove_leftovers
 from optimizers.archives import WorkspaceArchive, make_archive, write_archive
 from optimizers.checkpoint import CheckpointFolder, Header
 from optimizers.emitters.registry import EmitterSpec, emitter_name, make_emitter
 from optimizers.errors import CheckpointError, EmitterError, SearchError
 from optimizers.evaluate import Evaluator
-from optimizers.files import remove_leftovers
 from optimizers.result import SearchResult
 from optimizers.run_folder import RunFolder, git_revision, package_versions, pickle_versions, platform_name
 

@@ -25,8 +25,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from legible_envs.files import remove_leftovers, write_atomically
 from optimizers.errors import SearchError
-from optimizers.files import remove_leftovers, write_atomically
 
 __all__ = ["COLUMNS", "RunFolder", "git_revision", "package_versions", "pickle_versions"]
 

@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 from shelf_workspace import ShelfWorkspace
 
+from legible_envs.files import remove_leftovers, write_atomically
 from optimizers import CheckpointError, load_run, search
 from optimizers import checkpoint as checkpoints
 from optimizers.archives import archive_arrays, read_archive
-from optimizers.files import remove_leftovers, write_atomically
 from optimizers.run_folder import RunFolder
 
 SHELF = ShelfWorkspace()

@@ -19,7 +19,7 @@ KITCHEN = OvercookedWorkspace(shape=(5, 5))
 
 @pytest.fixture(autouse=True)
 def _clean_registry(monkeypatch):
-    monkeypatch.setattr(registry, "_REGISTERED", {})
+    monkeypatch.setattr(registry._registry, "_registered", {})
 
 
 class Shift(EmitterBase):
@@ -96,7 +96,7 @@ def test_a_registered_emitter_is_known_by_name_with_its_options():
 @pytest.mark.parametrize(
     ("name", "factory", "message"),
     [
-        ("improve", Shift, "'improve' is taken"),
+        ("improve", Shift, "'improve' is built in"),
         ("", Shift, "non-empty"),
         ("a:b", Shift, "without ':'"),
         ("x", 3, "must be callable"),
@@ -113,7 +113,7 @@ def test_a_bad_registration_is_refused(name, factory, message):
         ("imprve", r"no emitter named 'imprve'; known: .*improve, random"),
         ("no_such_module:X", "cannot be imported: No module named"),
         ("optimizers.errors:Nothing", "cannot be imported"),
-        ("optimizers.errors:__all__", "not callable but a list"),
+        ("optimizers.errors:__all__", "not a class or function but a list"),
         (7, "a name, 'module:Class' or a callable"),
         (lambda archive: object(), "returned a object, which has no 'ask'"),
         (lambda archive, workspace, seed, missing: None, "could not be called with archive, seed, workspace"),

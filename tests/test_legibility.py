@@ -250,7 +250,7 @@ def test_score_of_any_kitchen():
     assert result["score"] == pytest.approx(sum(row["contribution"] for row in rows))
     assert {row["goal"] for row in rows} == {"onion@(1,0)", "onion@(1,4)", "dish"}
     assert np.isfinite(ambiguity(layout, task)[1, 1])
-    with pytest.raises(LayoutError, match="needs a (tomato|cabbage|fish) station"):
+    with pytest.raises(LayoutError, match=r"needs a (tomato|cabbage|fish) station"):
         score_layout(layout)
     walled = OvercookedLayout.from_ascii("XXPXX\nO X O\nX X X\nXDXSX")
     with pytest.raises(LayoutError, match="cannot be done"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 from pathlib import Path
 
@@ -12,8 +13,10 @@ BLOCKS = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), 
 
 
 @pytest.mark.parametrize("number", range(len(BLOCKS)))
-def test_python_block(number, capsys):
-    exec(compile(BLOCKS[number], f"README.md, python block {number}", "exec"), {"__name__": "readme"})
+def test_python_block(number, capsys, tmp_path, monkeypatch):
+    (tmp_path / f"readme_block_{number}.py").write_text(BLOCKS[number], encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    importlib.import_module(f"readme_block_{number}")
     assert capsys.readouterr().out
 
 

@@ -372,7 +372,7 @@ def test_png_round_trip_and_a_failed_write_keeps_the_old_file(tmp_path, monkeypa
     before = path.read_bytes()
 
     def full(self, target, **_) -> None:  # type: ignore[no-untyped-def]
-        target.write_bytes(b"half a picture")
+        target.write(b"half a picture")
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(Image.Image, "save", full)

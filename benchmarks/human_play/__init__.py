@@ -3,6 +3,12 @@
 from __future__ import annotations
 
 from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from benchmarks.human_play.analysis import accuracy_table
+    from benchmarks.human_play.run import score_recorded_play
+    from benchmarks.human_play.sweep import PREDICTORS
 
 __all__ = ["PREDICTORS", "accuracy_table", "score_recorded_play"]
 

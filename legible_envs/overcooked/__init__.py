@@ -1,7 +1,12 @@
 """The kitchen: layouts, the workspace of their design, the playable game, and people in it."""
 
+from typing import TYPE_CHECKING
+
 from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.overcooked.recipes import PAPER_SOUPS, soup_task
+
+if TYPE_CHECKING:
+    from legible_envs.overcooked.workspace import OvercookedWorkspace
 
 __all__ = ["PAPER_SOUPS", "OvercookedLayout", "OvercookedWorkspace", "soup_task"]
 

@@ -34,13 +34,11 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from importlib import import_module
-from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 import numpy as np
 
+from legible_envs.plugins import Plugin, Registry, target_of
 from optimizers.errors import EmitterError
 
 __all__ = ["ENTRY_POINT_GROUP", "EmitterInfo", "EmitterSpec", "emitter_name", "list_emitters", "make_emitter"]
@@ -49,34 +47,17 @@ __all__ += ["register_emitter", "resolve_emitter"]
 ENTRY_POINT_GROUP = "legible.emitters"
 EmitterSpec = str | Callable[..., Any]
 
-_BUILT_IN = {
-    "improve": "optimizers.emitters.improve:ImproveWorkspaceEmitter",
-    "random": "optimizers.emitters.random:RandomWorkspaceEmitter",
-}
-_REGISTERED: dict[str, Callable[..., Any]] = {}
+EmitterInfo = Plugin
 
-
-@dataclass(frozen=True)
-class EmitterInfo:
-    """An emitter that can be used by name.
-
-    Attributes:
-        name: What to pass as ``emitter=``.
-        origin: ``"built in"``, ``"registered"``, or ``"entry point of PACKAGE VERSION"``.
-        target: Where it is defined, ``module:Name``.
-    """
-
-    name: str
-    origin: str
-    target: str
-
-    def summary(self) -> str:
-        """First line of its documentation; imports it. Says why where it cannot be imported."""
-        try:
-            text = inspect.getdoc(resolve_emitter(self.name)) or ""
-        except EmitterError as error:
-            return f"cannot be used: {error}"
-        return text.strip().split("\n")[0]
+_registry = Registry(
+    "emitter",
+    ENTRY_POINT_GROUP,
+    {
+        "improve": "optimizers.emitters.improve:ImproveWorkspaceEmitter",
+        "random": "optimizers.emitters.random:RandomWorkspaceEmitter",
+    },
+    EmitterError,
+)
 
 
 def register_emitter(name: str, factory: Callable[..., Any], *, overwrite: bool = False) -> None:
@@ -90,24 +71,12 @@ def register_emitter(name: str, factory: Callable[..., Any], *, overwrite: bool 
     Raises:
         EmitterError: The name is taken or not a name, or the factory cannot be called.
     """
-    if not isinstance(name, str) or not name or ":" in name:
-        raise EmitterError(f"an emitter's name must be a non-empty string without ':', got {name!r}")
-    if not callable(factory):
-        raise EmitterError(f"emitter {name!r}: the factory must be callable, got {type(factory).__name__}")
-    if name in _BUILT_IN or (not overwrite and name in _REGISTERED):
-        raise EmitterError(f"the emitter name {name!r} is taken; choose another{_overwrite_hint(name)}")
-    _REGISTERED[name] = factory
+    _registry.register(name, factory, overwrite=overwrite)
 
 
 def list_emitters() -> dict[str, EmitterInfo]:
     """Every emitter known by name: built in, registered in this process, and installed as entry points."""
-    found = {name: EmitterInfo(name, "built in", target) for name, target in _BUILT_IN.items()}
-    for name, point in sorted(_installed().items()):
-        package = f"{point.dist.name} {point.dist.version}" if point.dist is not None else "an unknown package"
-        found.setdefault(name, EmitterInfo(name, f"entry point of {package}", point.value))
-    for name, factory in _REGISTERED.items():
-        found[name] = EmitterInfo(name, "registered", emitter_name(factory))
-    return found
+    return _registry.list()
 
 
 def resolve_emitter(spec: EmitterSpec) -> Callable[..., Any]:
@@ -116,31 +85,12 @@ def resolve_emitter(spec: EmitterSpec) -> Callable[..., Any]:
     Raises:
         EmitterError: Nothing of that name, or it cannot be imported.
     """
-    if not isinstance(spec, str):
-        if callable(spec):
-            return spec
-        raise EmitterError(f"an emitter is a name, 'module:Class' or a callable, got {type(spec).__name__}")
-    if spec in _REGISTERED:
-        return _REGISTERED[spec]
-    if spec in _BUILT_IN:
-        return _load(_BUILT_IN[spec], spec)
-    installed = _installed()
-    if spec in installed:
-        try:
-            return installed[spec].load()
-        except (ImportError, AttributeError) as error:
-            raise EmitterError(f"emitter {spec!r} ({installed[spec].value}) cannot be imported: {error}") from error
-    if ":" in spec:
-        return _load(spec, spec)
-    raise EmitterError(f"no emitter named {spec!r}; known: {', '.join(sorted(list_emitters()))}; or use 'module:Class'")
+    return _registry.resolve(spec)
 
 
 def emitter_name(spec: EmitterSpec) -> str:
     """How a manifest names an emitter: as given, or ``module:Name`` for a callable."""
-    if isinstance(spec, str):
-        return spec
-    kind = spec if hasattr(spec, "__qualname__") else type(spec)
-    return f"{kind.__module__}:{kind.__qualname__}"
+    return spec if isinstance(spec, str) else target_of(spec)
 
 
 def make_emitter(
@@ -224,24 +174,3 @@ def _refuse_unknown(name: str, options: Mapping[str, Any], known: set[str], take
         raise EmitterError(
             f"{name} has no option {', '.join(unknown)}; its options: {', '.join(sorted(known - reserved))}"
         )
-
-
-def _installed() -> dict[str, EntryPoint]:
-    return {point.name: point for point in entry_points(group=ENTRY_POINT_GROUP)}
-
-
-def _load(target: str, name: str) -> Callable[..., Any]:
-    module, _, attribute = target.partition(":")
-    try:
-        found: Any = import_module(module)
-        for part in attribute.split("."):
-            found = getattr(found, part)
-    except (ImportError, AttributeError, ValueError) as error:
-        raise EmitterError(f"emitter {name!r} cannot be imported: {error}") from error
-    if not callable(found):
-        raise EmitterError(f"emitter {name!r} is not callable but a {type(found).__name__}")
-    return found
-
-
-def _overwrite_hint(name: str) -> str:
-    return "" if name in _BUILT_IN else " or pass overwrite=True"

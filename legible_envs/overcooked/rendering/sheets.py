@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from legible_envs.files import write_atomically
 from legible_envs.overcooked.rendering.canvas import Image, Sprite, paste, rgb, text_sprite
 from legible_envs.overcooked.rendering.palette import PALETTE
 
@@ -169,11 +169,6 @@ def save_png(path: str | os.PathLike[str], image: npt.NDArray[np.uint8]) -> Path
         raise ValueError(f"expected an (h, w, 3) uint8 image, got {image.shape} {image.dtype}")
     target = Path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
-    partial = target.with_name(f".{target.name}.{os.getpid()}.part")
-    try:
-        Pillow.fromarray(np.ascontiguousarray(image)).save(partial, format="PNG", optimize=True)
-        os.replace(partial, target)
-    finally:
-        with contextlib.suppress(FileNotFoundError):
-            partial.unlink()
+    picture = Pillow.fromarray(np.ascontiguousarray(image))
+    write_atomically(target, lambda stream: picture.save(stream, format="PNG", optimize=True))
     return target
