@@ -21,9 +21,10 @@ if TYPE_CHECKING:
     import pandas as pd
     from rich.console import Console
 
+    from legible_envs.overcooked.workspace import OvercookedWorkspace
     from legible_envs.workspace import Workspace
 
-__all__ = ["RANDOM_LAYOUTS", "conditions", "recorded_play", "run_demo"]
+__all__ = ["RANDOM_LAYOUTS", "conditions", "recorded_play", "run_demo", "write_boards_image"]
 
 SHAPE = (7, 7)
 EVALUATIONS = 600_000
@@ -74,7 +75,8 @@ def run_demo(
         found = conditions(workspace, result.best_genome, seed=seed, evaluations=efficient_evaluations)
     with _step(console, "Reading recorded people"):
         people = recorded_play(fetch=not offline)
-    image = write_best_image(out)
+    write_best_image(out)
+    image = write_boards_image(out, workspace, found)
     page = write_report(out, conditions=found, recorded_play=people)
     console.print()
     console.print(boards(console, found))
@@ -131,6 +133,20 @@ def _condition(workspace: Workspace, name: str, genome: npt.NDArray[Any], note: 
         distance=summary["distance"],
         normalised=summary["normalised"],
         note=note,
+    )
+
+
+def write_boards_image(out: Path, workspace: OvercookedWorkspace, found: list[Condition]) -> Path:
+    """Write ``boards.png``: the conditions side by side, each with the cells where the goal is in doubt."""
+    from legible_envs.overcooked.rendering import draw_ambiguity, draw_side_by_side, save_png
+
+    return save_png(
+        out / "boards.png",
+        draw_side_by_side(
+            [draw_ambiguity(c.layout, workspace.ambiguity(c.layout), tile=44) for c in found],
+            [c.name for c in found],
+            [f"legibility {c.score:.1f}\ndistance {c.distance:.0f} steps" for c in found],
+        ),
     )
 
 

@@ -43,7 +43,7 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
 
 def test_it_leaves_everything_a_user_was_promised(demo: tuple[Path, str]) -> None:
     files = {path.name for path in demo[0].iterdir()}
-    assert {"best.png", "best.txt", "archive.npz", "config.json", "metrics.csv", "report.html"} <= files
+    assert {"best.png", "boards.png", "best.txt", "archive.npz", "config.json", "metrics.csv", "report.html"} <= files
     best = OvercookedLayout.from_ascii((demo[0] / "best.txt").read_text())
     workspace = OvercookedWorkspace(shape=(5, 5))
     config = json.loads((demo[0] / "config.json").read_text())
