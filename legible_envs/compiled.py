@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import sys
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -23,31 +24,35 @@ _F = TypeVar("_F", bound=Callable[..., Any])
 
 
 @cache
-def cache_folder() -> Path | None:
-    """Folder of the compiled code, created on first use; None where nothing can be written (then nothing is cached)."""
+def cache_folder(package: str = "legible_envs") -> Path | None:
+    """Folder of a package's compiled code, created on first use; None where nothing can be written."""
     root = os.environ.get("NUMBA_CACHE_DIR")
     try:
-        folder = Path(root) if root else user_cache_path("legible-envs") / "numba" / _sources_digest()
+        folder = Path(root) if root else user_cache_path("legible-envs") / "numba" / _kernels_digest(package)
         folder.mkdir(parents=True, exist_ok=True)
         return folder if os.access(folder, os.W_OK) else None
     except OSError:
         return None
 
 
-def _sources_digest() -> str:
-    """Digest of all sources of the package: numba does not notice that a kernel called from another file changed."""
+def _kernels_digest(package: str) -> str:
+    """Digest of all files with kernels: numba does not notice that a kernel called from another file changed."""
+    ours = Path(__file__).parent
+    theirs = getattr(sys.modules.get(package), "__file__", None)
     digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.rglob("*.py")):
-        stat = path.stat()
-        digest.update(f"{path.name}:{stat.st_mtime_ns}:{stat.st_size};".encode())
+    for folder in sorted({ours, Path(theirs).parent if theirs else ours}):
+        for path in sorted(folder.rglob("*.py")):
+            source = path.read_bytes()
+            if b"@kernel" in source:
+                digest.update(source)
     return digest.hexdigest()[:16]
 
 
 def kernel(function: _F) -> _F:
     """Compile a function of plain arrays and numbers; see the module's docstring for where the result is kept."""
-    folder = cache_folder()
+    folder = cache_folder(function.__module__.partition(".")[0])
     if folder is None:
-        return numba.njit(function)
+        return numba.njit(error_model="numpy")(function)
     # Numba reads this setting when a function is decorated; other people's functions must not see ours.
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(folder)
