@@ -13,6 +13,7 @@ from benchmarks.console import number
 from benchmarks.runs import RunError, is_run_folder, read_config
 
 if TYPE_CHECKING:
+    from legible_envs.overcooked import OvercookedLayout
     from optimizers import SearchResult
 
 __all__ = ["default_folder", "emitter_rows", "resumed_settings", "run_search"]
@@ -20,6 +21,8 @@ __all__ = ["default_folder", "emitter_rows", "resumed_settings", "run_search"]
 
 def default_folder(domain: str, settings: Mapping[str, Any]) -> Path:
     """Where a search is written that names no folder."""
+    if settings.get("start_from"):
+        return Path("runs") / f"{domain}-from-{Path(settings['start_from']).stem}-seed{settings['seed']}"
     rows, columns = settings["shape"]
     return Path("runs") / f"{domain}-{rows}x{columns}-{settings['objective']}-seed{settings['seed']}"
 
@@ -38,6 +41,9 @@ def resumed_settings(folder: Path, settings: Mapping[str, Any], given: Collectio
         "pots": workspace.get("pots"),
         "objective": config["objective"]["name"],
         "max_distance": config["objective"].get("max_distance"),
+        "start_from": workspace.get("start_from"),
+        "lock": tuple(workspace.get("locked") or ()),
+        "relocation_cost": workspace.get("relocation_cost", 0.0),
         "emitter": config["emitter"]["name"],
         "evaluations": config.get("evaluations", settings["evaluations"]),
         "seed": config.get("seed", settings["seed"]),
@@ -57,6 +63,9 @@ def run_search(
     evaluations: int,
     seed: int,
     max_distance: float | None,
+    start_from: str | None,
+    lock: tuple[str, ...],
+    relocation_cost: float,
     resume: bool,
     overwrite: bool,
     quiet: bool,
@@ -75,7 +84,14 @@ def run_search(
             f"{out} already holds a search: add --resume to continue it, --overwrite to replace it, or choose another "
             "folder with --out"
         )
-    workspace = make_workspace(domain, shape=shape, prefix=prefix, pots=pots)
+    design: dict[str, Any] = {"shape": shape, "prefix": prefix, "pots": pots}
+    if start_from is not None:
+        kitchen = _existing_kitchen(start_from)
+        design |= {"shape": kitchen.shape, "start_from": kitchen.to_ascii(), "relocation_cost": relocation_cost}
+        design["locked"] = list(lock)
+    elif lock or relocation_cost:
+        raise click.UsageError("--lock and --relocation-cost need --start-from, the kitchen they are about")
+    workspace = make_workspace(domain, **design)
     try:
         result = search(
             workspace,
@@ -97,6 +113,14 @@ def run_search(
         click.echo(f"to go on: legible optimize {domain} --resume --out {shlex.quote(str(out))}", err=True)
         raise click.exceptions.Exit(130) from None
     _tell(result, out)
+
+
+def _existing_kitchen(start_from: str) -> OvercookedLayout:
+    """The kitchen of ``--start-from``; the manifest of a run holds the drawing itself."""
+    from benchmarks.kitchens import load_kitchen
+    from legible_envs.overcooked import OvercookedLayout
+
+    return OvercookedLayout.from_ascii(start_from) if "\n" in start_from else load_kitchen(start_from).layout
 
 
 def _tell(result: SearchResult, out: Path) -> None:

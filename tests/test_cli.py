@@ -16,7 +16,7 @@ from run_folders import write_run
 from benchmarks.cli import main
 from benchmarks.kitchens import load_kitchen
 from legible_envs import __version__
-from legible_envs.overcooked import OvercookedWorkspace
+from legible_envs.overcooked import OvercookedLayout, OvercookedWorkspace
 
 KITCHEN = """\
 XTXPXXX
@@ -118,6 +118,20 @@ def test_optimize_writes_a_whole_run(run: Path) -> None:
     workspace = OvercookedWorkspace(shape=(5, 6))
     genome = np.array(config["result"]["best_genome"], dtype=np.int8)
     assert workspace.legibility(genome) == pytest.approx(config["result"]["best_objective"])
+
+
+def test_optimize_starts_from_an_existing_kitchen(run: Path, tmp_path: Path) -> None:
+    kitchen, out = tmp_path / "mine.txt", tmp_path / "moved"
+    kitchen.write_text((run / "best.txt").read_text())
+    again = ("optimize", "overcooked", "--out", out, "--evaluations", 2000, "--quiet")
+    result = legible(*again, "--start-from", kitchen, "--lock", "pot", "--relocation-cost", 100)
+    assert result.exit_code == 0, result.output
+    before, after = (OvercookedLayout.from_ascii(path.read_text()) for path in (kitchen, out / "best.txt"))
+    assert after.stations == before.stations  # at this price nothing is moved
+    assert legible(*again, "--resume").exit_code == 0
+    refused = legible("optimize", "overcooked", "--lock", "pot", "--out", tmp_path / "none")
+    assert refused.exit_code == 2
+    assert "need --start-from" in refused.output
 
 
 def test_optimize_does_not_touch_a_run_unasked(run: Path) -> None:
