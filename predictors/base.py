@@ -265,4 +265,5 @@ class GoalStream:
             layout_name=part.layout_name,
             candidate_set=part.candidate_set,
             complete=False,
+            goal_positions=part.goal_positions,
         )
