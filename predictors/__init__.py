@@ -13,13 +13,27 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from predictors.base import GoalPredictor
     from predictors.grid.bayesian import BayesianGoalPredictor
+    from predictors.grid.knn import GridNeighbours
+    from predictors.grid.logistic import GridLogistic
+    from predictors.grid.maxent_irl import MaxEntIRL
+    from predictors.grid.ngram import GridNGram
     from predictors.grid.shortest_distance import ShortestDistance
+    from predictors.neural.recurrent import RecurrentPredictor
+    from predictors.neural.transformer import TransformerPredictor
     from predictors.registry import check_predictor, list_predictors, make_predictor, register_predictor
+    from predictors.streaming import ThresholdDecision
 
 __all__ = [
     "BayesianGoalPredictor",
     "GoalPredictor",
+    "GridLogistic",
+    "GridNGram",
+    "GridNeighbours",
+    "MaxEntIRL",
+    "RecurrentPredictor",
     "ShortestDistance",
+    "ThresholdDecision",
+    "TransformerPredictor",
     "check_predictor",
     "list_predictors",
     "make_predictor",
@@ -30,7 +44,14 @@ __all__ = [
 _HOME = {
     "BayesianGoalPredictor": "predictors.grid.bayesian",
     "GoalPredictor": "predictors.base",
+    "GridLogistic": "predictors.grid.logistic",
+    "GridNGram": "predictors.grid.ngram",
+    "GridNeighbours": "predictors.grid.knn",
+    "MaxEntIRL": "predictors.grid.maxent_irl",
+    "RecurrentPredictor": "predictors.neural.recurrent",
     "ShortestDistance": "predictors.grid.shortest_distance",
+    "ThresholdDecision": "predictors.streaming",
+    "TransformerPredictor": "predictors.neural.transformer",
     "check_predictor": "predictors.registry",
     "list_predictors": "predictors.registry",
     "make_predictor": "predictors.registry",

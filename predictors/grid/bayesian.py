@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Literal, Self
+from typing import Any, Final, Literal, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +12,7 @@ from sklearn.base import clone
 from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.rollouts import Trajectory
 from predictors.grid.distances import GridPredictor, check_complete, posterior, remaining_steps
-from predictors.grid.graphs import optimal_costs, soft_costs
+from predictors.grid.graphs import optimal_costs, soft_costs, walk_graph
 from predictors.grid.maxent_irl import MaxEntIRL
 from predictors.grid.priors import GoalPrior, Prior
 from predictors.grid.walk_likelihood import best_uniform_cost, collect_evidence
@@ -21,6 +21,8 @@ __all__ = ["BayesianGoalPredictor"]
 
 Costs = Literal["hard", "soft"]
 CellCosts = Literal["uniform", "learned"] | MaxEntIRL | npt.NDArray[np.float64]
+
+_MARGIN: Final = 0.25
 
 
 class BayesianGoalPredictor(GridPredictor):
@@ -38,9 +40,10 @@ class BayesianGoalPredictor(GridPredictor):
     Args:
         beta: Rationality, per unit of cost: 0 learns nothing from the way, larger values judge detours more sharply.
             With hard costs and a uniform prior, which goal is on top does not depend on it. ``"fit"``: the value that
-            makes the walks of ``fit`` most likely (uniform costs only).
-        costs: ``"hard"`` or ``"soft"``. Soft costs need a ``beta`` at which the sum over walks is finite (above 1.25
-            suffices in a room of 5 x 5 cells, 1.39 anywhere at uniform costs of 1).
+            makes the walks of ``fit`` most likely (uniform costs only). None: 1; but with soft uniform costs, in
+            kitchens so open that the sum over walks diverges at 1, .25 more than where it begins to be finite.
+        costs: ``"hard"`` or ``"soft"``. Soft costs need a ``beta`` at which the sum over walks is finite: at uniform
+            costs above 1.25 in a room of 5 x 5 cells, 1.39 suffices anywhere.
         cell_costs: What entering a cell costs: ``"uniform"``: 1. ``"learned"``: what :class:`MaxEntIRL` learns in
             ``fit``. A ``MaxEntIRL`` with other settings, which is cloned and fitted. Or the ``(H, W)`` costs
             themselves, the same for all kitchens of this shape.
@@ -48,7 +51,7 @@ class BayesianGoalPredictor(GridPredictor):
 
     Attributes:
         classes_: ``(K,)`` names of all goals and candidates seen in ``fit``, sorted.
-        beta_: The rationality used.
+        beta_: The rationality used (without the correction of ``beta=None``).
         irl_: The fitted :class:`MaxEntIRL`, with learned costs.
 
     Example:
@@ -65,7 +68,7 @@ class BayesianGoalPredictor(GridPredictor):
 
     def __init__(
         self,
-        beta: float | Literal["fit"] = 1.0,
+        beta: float | Literal["fit"] | None = None,
         *,
         costs: Costs = "hard",
         cell_costs: CellCosts = "uniform",
@@ -92,13 +95,12 @@ class BayesianGoalPredictor(GridPredictor):
                 check_complete(walk, number)
             self.beta_ = best_uniform_cost(collect_evidence(walks))
         else:
-            self.beta_ = float(self.beta)
-        if (
-            self.cell_costs is not None
-            and isinstance(self.cell_costs, str | MaxEntIRL)
-            and self.cell_costs != "uniform"
-        ):
-            self.irl_ = (MaxEntIRL() if isinstance(self.cell_costs, str) else clone(self.cell_costs)).fit(walks)
+            self.beta_ = 1.0 if self.beta is None else float(self.beta)
+        self.__dict__.pop("irl_", None)
+        if isinstance(self.cell_costs, MaxEntIRL):
+            self.irl_ = clone(self.cell_costs).fit(walks)
+        elif isinstance(self.cell_costs, str) and self.cell_costs == "learned":
+            self.irl_ = MaxEntIRL().fit(walks)
         return self
 
     def _check_parameters(self) -> None:
@@ -106,8 +108,10 @@ class BayesianGoalPredictor(GridPredictor):
         if beta == "fit":
             if not isinstance(self.cell_costs, str) or self.cell_costs != "uniform":
                 raise ValueError("`beta='fit'` goes with uniform costs; learned costs are in nats: leave `beta` at 1")
-        elif isinstance(beta, bool) or not isinstance(beta, int | float) or not 0 <= beta < np.inf:
-            raise ValueError(f"`beta` must be a finite number >= 0 or 'fit', got {beta!r}")
+        elif beta is not None and (
+            isinstance(beta, bool) or not isinstance(beta, int | float) or not 0 <= beta < np.inf
+        ):
+            raise ValueError(f"`beta` must be a finite number >= 0, 'fit' or None, got {beta!r}")
         if self.costs not in ("hard", "soft"):
             raise ValueError(f"`costs` must be 'hard' or 'soft', got {self.costs!r}")
         if isinstance(self.cell_costs, str) and self.cell_costs not in ("uniform", "learned"):
@@ -141,10 +145,13 @@ class BayesianGoalPredictor(GridPredictor):
             costs = self.irl_.cost_map(layout) if hasattr(self, "irl_") else np.asarray(self.cell_costs, np.float64)
         if self.costs == "hard":
             return self.beta_ * optimal_costs(layout, goals, costs)
+        beta = self.beta_
+        if uniform and self.beta is None:
+            beta = max(beta, walk_graph(layout, goals).divergence_cost + _MARGIN)
         try:
-            return soft_costs(layout, goals, self.beta_ * costs)
+            return soft_costs(layout, goals, beta * costs)
         except ValueError as error:
-            raise ValueError(f"{error}; with costs='soft' raise `beta` ({self.beta_:.4g}) or let beta='fit'") from error
+            raise ValueError(f"{error}; raise `beta` ({self.beta_:.4g}) or give beta='fit'") from error
 
     def candidate_probabilities(self, walk: Trajectory) -> npt.NDArray[np.float64]:
         """``(len(walk.candidates),)`` probabilities in the order of the walk's candidates.

@@ -20,7 +20,6 @@ from predictors.grid.walk_likelihood import (
     best_uniform_cost,
     collect_evidence,
     minimise,
-    position_features,
 )
 
 if TYPE_CHECKING:
@@ -132,7 +131,7 @@ class MaxEntIRL(GridPredictor):
         if isinstance(self.features, str):
             self.coef_ = {}
             for layout, part in evidence.items():
-                self.coef_[layout], loss = self._learn({layout: part}, position_features)
+                self.coef_[layout], loss = self._learn({layout: part}, None)
                 value += loss
         else:
             self.coef_, value = self._learn(evidence, self._feature_map())
@@ -144,7 +143,7 @@ class MaxEntIRL(GridPredictor):
             self.reward_ = -self.cost_
         return self
 
-    def _learn(self, evidence: dict[OvercookedLayout, Evidence], features: FeatureMap) -> tuple[Floats, float]:
+    def _learn(self, evidence: dict[OvercookedLayout, Evidence], features: FeatureMap | None) -> tuple[Floats, float]:
         """Weights shared by some kitchens, and the negative log-likelihood there; sets their costs."""
         found = minimise(evidence, features, self.uniform_cost_, self.l2, self.max_iter, self.tol)
         self.n_iter_ = max(self.n_iter_, found.iterations)

@@ -15,7 +15,7 @@ from legible_envs.rollouts import Trajectory
 from predictors.grid.graphs import WalkGraph, walk_graph
 from predictors.grid.walk_sums import likelihood
 
-__all__ = ["Evidence", "FeatureMap", "Fit", "best_uniform_cost", "collect_evidence", "minimise", "position_features"]
+__all__ = ["Evidence", "FeatureMap", "Fit", "best_uniform_cost", "collect_evidence", "minimise"]
 
 Floats = npt.NDArray[np.float64]
 FeatureMap = Callable[[OvercookedLayout], npt.NDArray[np.float64]]
@@ -104,20 +104,17 @@ def best_uniform_cost(evidence: Mapping[OvercookedLayout, Evidence]) -> float:
     return float(brentq(slope, low, high, xtol=1e-10)) if slope(low) < 0 else low
 
 
-def position_features(layout: OvercookedLayout) -> Floats:
-    """``(H*W, H*W)`` one feature per cell."""
-    return np.eye(layout.cells.size)
-
-
 def minimise(
     evidence: Mapping[OvercookedLayout, Evidence],
-    features: FeatureMap,
+    features: FeatureMap | None,
     uniform: float,
     l2: float,
     max_iter: int,
     tol: float,
 ) -> Fit:
     """Weights of features that make the walks most likely, ``l2 / 2 |weights|^2`` added to the loss.
+
+    Without features each cell in reach has a weight of its own.
 
     Outside its domain the loss is a large number, at which L-BFGS backs off.
 
@@ -126,7 +123,10 @@ def minimise(
     """
     from scipy.optimize import minimize
 
-    parts = [(part, _features_of(part.graph, features)) for part in evidence.values()]
+    parts = [
+        (part, np.eye(len(part.visits)) if features is None else _features_of(part.graph, features))
+        for part in evidence.values()
+    ]
     width = parts[0][1].shape[1]
     if any(matrix.shape[1] != width for _, matrix in parts):
         raise ValueError(f"kitchens have different numbers of features: {[matrix.shape[1] for _, matrix in parts]}")
@@ -142,7 +142,7 @@ def minimise(
             gradient = gradient + matrix.T @ slope
         return value / count, gradient / count
 
-    options = {"maxiter": int(max_iter), "gtol": tol, "ftol": 1e-14, "maxcor": 20}
+    options = {"maxiter": int(max_iter), "gtol": tol, "ftol": 1e-14}
     found = minimize(objective, np.zeros(width), jac=True, method="L-BFGS-B", options=options)
     weights = np.asarray(found.x, dtype=np.float64)
     costs = {part.graph.layout: _grid(part.graph, uniform + matrix @ weights) for part, matrix in parts}
@@ -163,7 +163,6 @@ def _features_of(graph: WalkGraph, features: FeatureMap) -> Floats:
     if not np.isfinite(chosen).all():
         row, col = graph.cells[int(np.argwhere(~np.isfinite(chosen))[0][0])]
         raise ValueError(f"features must be finite on the floor; those of row {row}, column {col} are not")
-    # A column that is zero on the floor (a counter's position) keeps weight zero and is harmless.
     return chosen
 
 
