@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Self
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy.typing as npt
 
 from legible_envs.rollouts import Trajectory
 
-__all__ = ["Reach", "resample"]
+__all__ = ["Reach", "check_dimension", "check_reaches", "resample"]
 
 _Array = npt.NDArray[np.float64]
 
@@ -84,3 +85,32 @@ def resample(features: _Array, times: _Array, count: int) -> _Array:
     """
     at = np.linspace(times[0], times[-1], count)
     return np.stack([np.interp(at, times, column) for column in features.T], axis=1)
+
+
+def check_reaches(walks: Sequence[Trajectory]) -> int:
+    """The dimension of reaches that can be learned from.
+
+    Raises:
+        ValueError: An unknown goal, a prefix, fewer than two states, no duration, or mixed dimensions.
+    """
+    for number, walk in enumerate(walks):
+        if walk.goal is None:
+            raise ValueError(f"reach {number} has no known goal to learn from")
+        if not walk.complete:
+            raise ValueError(f"reach {number} is a prefix; `fit` learns from complete reaches")
+        if walk.num_states < 2 or not walk.times[-1] > walk.times[0]:
+            raise ValueError(
+                f"reach {number} has {walk.num_states} states and no duration; it needs at least 2 and some"
+            )
+        if walk.states.shape[1] != walks[0].states.shape[1]:
+            raise ValueError(
+                f"all reaches must have one dimension; reach 0 has {walks[0].states.shape[1]}, reach {number} has "
+                f"{walk.states.shape[1]}"
+            )
+    return int(walks[0].states.shape[1])
+
+
+def check_dimension(walk: Trajectory, dimension: int) -> None:
+    """Refuse states of another dimension than those learned from."""
+    if walk.num_states and walk.states.shape[1] != dimension:
+        raise ValueError(f"expected states of dimension {dimension} as in `fit`, got {walk.states.shape[1]}")

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from legible_envs.rollouts import Cut, Trajectory
 from predictors.base import FRACTIONS, GoalPredictor, GoalStream
 from predictors.reaching.alignment import dba_step, match_means, pairwise_costs
-from predictors.reaching.features import Reach, resample
+from predictors.reaching.features import Reach, check_dimension, check_reaches, resample
 from predictors.reaching.open_end import observe
 
 __all__ = ["ReachStream", "TimeSeriesGaussian"]
@@ -106,7 +106,7 @@ class TimeSeriesGaussian(GoalPredictor):
         self._check_parameters()
         super().fit(X, y)
         walks = list(X)
-        self.n_dims_ = _check_reaches(walks)
+        self.n_dims_ = check_reaches(walks)
         by_goal: dict[str, list[Reach]] = {}
         for walk in walks:
             by_goal.setdefault(str(walk.goal), []).append(Reach(walk))
@@ -217,7 +217,7 @@ class TimeSeriesGaussian(GoalPredictor):
 
     def _scores(self, walk: Trajectory, duration: float) -> npt.NDArray[np.float64]:
         """``(T, G)`` mean log-density of the samples so far, after each sample."""
-        self._check_dimension(walk)
+        check_dimension(walk, self.n_dims_)
         if not walk.num_states:
             return np.zeros((0, len(self.goals_)))
         reach = Reach(walk)
@@ -234,10 +234,6 @@ class TimeSeriesGaussian(GoalPredictor):
             np.zeros((3, *self._log_norms.shape)),
             False,
         )
-
-    def _check_dimension(self, walk: Trajectory) -> None:
-        if walk.num_states and walk.states.shape[1] != self.n_dims_:
-            raise ValueError(f"expected states of dimension {self.n_dims_} as in `fit`, got {walk.states.shape[1]}")
 
     def _windows(
         self, times: npt.NDArray[np.float64], duration: float, reached: npt.NDArray[np.int64] | None = None
@@ -280,25 +276,6 @@ class TimeSeriesGaussian(GoalPredictor):
             known = scores[columns[modelled]]
             weights[modelled] = np.exp(known - known.max())
         return weights / weights.sum()
-
-
-def _check_reaches(walks: Sequence[Trajectory]) -> int:
-    """The dimension of reaches that can be learned from."""
-    for number, walk in enumerate(walks):
-        if walk.goal is None:
-            raise ValueError(f"reach {number} has no known goal to learn from")
-        if not walk.complete:
-            raise ValueError(f"reach {number} is a prefix; `fit` learns from complete reaches")
-        if walk.num_states < 2 or not walk.times[-1] > walk.times[0]:
-            raise ValueError(
-                f"reach {number} has {walk.num_states} states and no duration; it needs at least 2 and some"
-            )
-        if walk.states.shape[1] != walks[0].states.shape[1]:
-            raise ValueError(
-                f"all reaches must have one dimension; reach 0 has {walks[0].states.shape[1]}, reach {number} has "
-                f"{walk.states.shape[1]}"
-            )
-    return int(walks[0].states.shape[1])
 
 
 class ReachStream(GoalStream):
