@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from predictors.grid.shortest_distance import ShortestDistance
     from predictors.neural.recurrent import RecurrentPredictor
     from predictors.neural.transformer import TransformerPredictor
+    from predictors.reaching.baselines import ReachLogistic, ReachNeighbours
+    from predictors.reaching.bayesian import StraightLineBayesian
+    from predictors.reaching.gaussian import TimeSeriesGaussian
     from predictors.registry import check_predictor, list_predictors, make_predictor, register_predictor
     from predictors.streaming import ThresholdDecision
 
@@ -30,9 +33,13 @@ __all__ = [
     "GridNGram",
     "GridNeighbours",
     "MaxEntIRL",
+    "ReachLogistic",
+    "ReachNeighbours",
     "RecurrentPredictor",
     "ShortestDistance",
+    "StraightLineBayesian",
     "ThresholdDecision",
+    "TimeSeriesGaussian",
     "TransformerPredictor",
     "check_predictor",
     "list_predictors",
@@ -48,9 +55,13 @@ _HOME = {
     "GridNGram": "predictors.grid.ngram",
     "GridNeighbours": "predictors.grid.knn",
     "MaxEntIRL": "predictors.grid.maxent_irl",
+    "ReachLogistic": "predictors.reaching.baselines",
+    "ReachNeighbours": "predictors.reaching.baselines",
     "RecurrentPredictor": "predictors.neural.recurrent",
     "ShortestDistance": "predictors.grid.shortest_distance",
+    "StraightLineBayesian": "predictors.reaching.bayesian",
     "ThresholdDecision": "predictors.streaming",
+    "TimeSeriesGaussian": "predictors.reaching.gaussian",
     "TransformerPredictor": "predictors.neural.transformer",
     "check_predictor": "predictors.registry",
     "list_predictors": "predictors.registry",

@@ -17,7 +17,7 @@ from legible_envs.rollouts import Cut, Trajectory
 from predictors.base import FRACTIONS, GoalPredictor
 from predictors.reaching.features import Reach, check_dimension, check_reaches
 
-__all__ = ["ReachLogistic", "ReachNearestNeighbors"]
+__all__ = ["ReachLogistic", "ReachNeighbours"]
 
 
 class _MomentClassifier(GoalPredictor):
@@ -125,7 +125,7 @@ class ReachLogistic(_MomentClassifier):
         return make_pipeline(StandardScaler(), expand, LogisticRegression(C=self.C, max_iter=300))
 
 
-class ReachNearestNeighbors(_MomentClassifier):
+class ReachNeighbours(_MomentClassifier):
     """The goals of the most similar moments of earlier reaches, by standardised position, velocity and time.
 
     Args:

@@ -34,7 +34,7 @@ class StraightLineBayesian(PlacePredictor):
         >>> cups = {"candidates": ("left", "right"), "goal_positions": ((-0.2, 0.3), (0.2, 0.3))}
         >>> reach = Trajectory([(0.0, 0.0), (0.05, 0.1)], goal="right", **cups)
         >>> StraightLineBayesian().fit([reach]).predict_proba([reach.first(1), reach]).round(3).tolist()
-        [[0.5, 0.5], [0.203, 0.797]]
+        [[0.5, 0.5], [0.197, 0.803]]
     """
 
     def __init__(self, beta: float = 20.0) -> None:
