@@ -22,11 +22,12 @@ __all__ = [
     "Floats",
     "clear",
     "corners_between",
+    "first_corner",
     "grow",
     "is_free",
     "keep_corners",
     "nearest_free",
-    "path_length",
+    "norm",
     "path_tables",
     "write_path",
 ]
@@ -35,6 +36,12 @@ Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
 SHRINK = 1e-9
+
+
+@kernel
+def norm(dx: float, dy: float) -> float:
+    """Length of a vector (a table is no place for overflow, so the plain formula does)."""
+    return np.sqrt(dx * dx + dy * dy)
 
 
 @kernel
@@ -116,7 +123,7 @@ def corners_between(boxes: Floats, corners: Floats, count: int, between: Floats)
         for j in range(i):
             distance = np.inf
             if clear(boxes, corners[i, 0], corners[i, 1], corners[j, 0], corners[j, 1]):
-                distance = np.hypot(corners[i, 0] - corners[j, 0], corners[i, 1] - corners[j, 1])
+                distance = norm(corners[i, 0] - corners[j, 0], corners[i, 1] - corners[j, 1])
             between[i, j] = distance
             between[j, i] = distance
 
@@ -146,7 +153,7 @@ def path_tables(
             after[g, i] = -1
             best[i] = np.inf
             if clear(boxes, corners[i, 0], corners[i, 1], x, y):
-                best[i] = np.hypot(corners[i, 0] - x, corners[i, 1] - y)
+                best[i] = norm(corners[i, 0] - x, corners[i, 1] - y)
         for _ in range(count):
             nearest = -1
             for i in range(count):
@@ -182,21 +189,13 @@ def first_corner(
         ``(length, corner)``; corner -1 where the way is straight, and length inf where there is none.
     """
     if clear(boxes, x, y, goal_x, goal_y):
-        return np.hypot(goal_x - x, goal_y - y), -1
+        return norm(goal_x - x, goal_y - y), -1
     best, first = np.inf, -1
     for i in range(count):
-        length = np.hypot(corners[i, 0] - x, corners[i, 1] - y) + lengths[i]
+        length = norm(corners[i, 0] - x, corners[i, 1] - y) + lengths[i]
         if length < best and clear(boxes, x, y, corners[i, 0], corners[i, 1]):
             best, first = length, i
     return best, first
-
-
-@kernel
-def path_length(
-    boxes: Floats, corners: Floats, count: int, lengths: Floats, x: float, y: float, goal_x: float, goal_y: float
-) -> float:
-    """Length of the shortest path from a free point to one goal; see :func:`first_corner`."""
-    return first_corner(boxes, corners, count, lengths, x, y, goal_x, goal_y)[0]
 
 
 @kernel
@@ -227,7 +226,7 @@ def consider(
 ) -> None:
     """Keep in ``best [3]`` (distance, x, y) the nearest free point to ``best [3:5]`` seen so far."""
     px, py = x + t * along[0], y + t * along[1]
-    distance = np.hypot(px - best[3], py - best[4])
+    distance = norm(px - best[3], py - best[4])
     if distance < best[0] and is_free(boxes, px, py, size):
         best[0] = distance
         best[1] = px
