@@ -39,10 +39,10 @@ class MaxEntIRL(GridPredictor):
     its gradient are exact, and the fit is convex. It is defined while the sum is finite, that is while the spectral
     radius of ``W`` is below 1: loitering must cost something.
 
-    Costs are ``u + features @ coef``: ``u`` the best uniform cost per step for all walks together, the weights found by
-    maximum likelihood with the penalty ``l2 / 2 |coef|^2``. The penalty is needed: with a value per position, costs
-    raised on the black and lowered on the white cells of a checkerboard describe (almost) the same people. Kitchens
-    without walks get the uniform cost.
+    Costs are ``u + features @ coef``, the weights found by maximum likelihood with the penalty ``l2 / 2 |coef|^2``.
+    With a weight per position ``u`` is the best uniform cost per step for all walks together, and what kitchens without
+    walks get; with other features it is found along with them. The penalty is needed: costs raised on the black and
+    lowered on the white cells of a checkerboard describe (almost) the same people.
 
     The belief is ``P(G | S->Q) ∝ P(G) Z[Q, G] / Z[S, G]``, the exact posterior of this model; it is what
     ``BayesianGoalPredictor(costs="soft", cell_costs="learned")`` computes.
@@ -51,8 +51,8 @@ class MaxEntIRL(GridPredictor):
         features: ``"position"``: a weight for each cell of each kitchen. Or ``(H*W, k)`` features of the cells in
             reading order, for kitchens of that shape, or a function that returns them for a layout; the ``k`` weights
             are shared by all kitchens.
-        l2: Strength of the pull toward the uniform cost, above 0. On recorded play 1 makes unseen walks
-            slightly more likely than 10 does (by .01 to .02 nats per walk), and 10 reads goals about as well.
+        l2: Strength of the pull toward the uniform cost, above 0. On some hundred recorded walks per kitchen less pull
+            (1) makes unseen walks a little more likely, by .01 to .03 nats each, and reads goals no better.
         prior: ``"uniform"`` over candidates, or ``"empirical"``: as often as each was chosen in ``fit``.
         max_iter: Most iterations of L-BFGS.
         tol: Largest component of the gradient, per walk, at which the fit is done.
@@ -63,6 +63,7 @@ class MaxEntIRL(GridPredictor):
         costs_: Learned cost of entering each cell, ``{layout: (H, W)}``, NaN where no walk can go.
         cost_: That of the only kitchen; absent where there are several.
         reward_: ``-cost_``.
+        intercept_: The level ``u``.
         coef_: Learned weights: ``(k,)``, or ``{layout: (n,)}`` of the cells in reach for ``"position"``.
         log_likelihood_: Of the walks learned from, in nats per walk, given start and goal of each.
         n_iter_: Iterations used.
@@ -82,6 +83,7 @@ class MaxEntIRL(GridPredictor):
     """
 
     uniform_cost_: float
+    intercept_: float
     costs_: dict[OvercookedLayout, Floats]
     cost_: Floats
     reward_: Floats
@@ -94,7 +96,7 @@ class MaxEntIRL(GridPredictor):
     def __init__(
         self,
         features: Features = "position",
-        l2: float = 10.0,
+        l2: float = 15.0,
         *,
         prior: Prior = "uniform",
         max_iter: int = 500,
@@ -149,6 +151,7 @@ class MaxEntIRL(GridPredictor):
         self.n_iter_ = max(self.n_iter_, found.iterations)
         self.converged_ = self.converged_ and found.converged
         self.costs_.update(found.costs)
+        self.intercept_ = found.level
         return found.weights, found.loss
 
     def _check_parameters(self) -> None:
@@ -176,10 +179,9 @@ class MaxEntIRL(GridPredictor):
             return self.costs_[layout]
         costs = np.full(layout.shape, np.nan)
         floor = layout.cells == 0
-        costs[floor] = self.uniform_cost_
-        if callable(self.features):
-            values = np.asarray(self.features(layout), dtype=np.float64) @ self.coef_
-            costs[floor] += values.reshape(layout.shape)[floor]
+        costs[floor] = self.intercept_
+        if not isinstance(self.features, str):
+            costs[floor] += (np.asarray(self._feature_map()(layout)) @ self.coef_).reshape(layout.shape)[floor]
         return costs
 
     def goal_costs(self, layout: OvercookedLayout, goals: tuple[str, ...]) -> Floats:

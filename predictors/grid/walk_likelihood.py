@@ -54,8 +54,18 @@ class Evidence:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """What :func:`minimise` found: weights, the loss without penalty, ``(H, W)`` costs per kitchen, and how."""
+    """What :func:`minimise` found.
 
+    Attributes:
+        level: Cost of cells whose features are zero.
+        weights: ``(k,)`` of the features.
+        loss: Negative log-likelihood, without the penalty.
+        costs: ``(H, W)`` per kitchen, NaN where no walk goes.
+        iterations: Iterations used.
+        converged: Whether they sufficed.
+    """
+
+    level: float
     weights: Floats
     loss: float
     costs: dict[OvercookedLayout, Floats]
@@ -114,7 +124,8 @@ def minimise(
 ) -> Fit:
     """Weights of features that make the walks most likely, ``l2 / 2 |weights|^2`` added to the loss.
 
-    Without features each cell in reach has a weight of its own.
+    Without features each cell in reach has a weight of its own, and all of them are pulled toward the uniform cost.
+    With features the level of the costs is found along with the weights, and not pulled anywhere.
 
     Outside its domain the loss is a large number, at which L-BFGS backs off.
 
@@ -123,17 +134,17 @@ def minimise(
     """
     from scipy.optimize import minimize
 
-    parts = [
-        (part, np.eye(len(part.visits)) if features is None else _features_of(part.graph, features))
-        for part in evidence.values()
-    ]
+    parts = [(part, _design(part.graph, features)) for part in evidence.values()]
     width = parts[0][1].shape[1]
     if any(matrix.shape[1] != width for _, matrix in parts):
-        raise ValueError(f"kitchens have different numbers of features: {[matrix.shape[1] for _, matrix in parts]}")
+        raise ValueError(f"kitchens have different numbers of features: {[matrix.shape[1] - 1 for _, matrix in parts]}")
     count = float(sum(part.weights.sum() for part, _ in parts))
+    pull = np.full(width, float(l2))
+    if features is not None:
+        pull[0] = 0.0
 
     def objective(weights: Floats) -> tuple[float, Floats]:
-        value, gradient = 0.5 * l2 * float(weights @ weights), l2 * weights
+        value, gradient = 0.5 * float(pull @ weights**2), pull * weights
         for part, matrix in parts:
             loss, slope = part.loss(uniform + matrix @ weights)
             if not np.isfinite(loss):
@@ -146,8 +157,17 @@ def minimise(
     found = minimize(objective, np.zeros(width), jac=True, method="L-BFGS-B", options=options)
     weights = np.asarray(found.x, dtype=np.float64)
     costs = {part.graph.layout: _grid(part.graph, uniform + matrix @ weights) for part, matrix in parts}
-    loss = count * float(found.fun) - 0.5 * l2 * float(weights @ weights)
-    return Fit(weights, loss, costs, int(found.nit), bool(found.success))
+    loss = count * float(found.fun) - 0.5 * float(pull @ weights**2)
+    level = uniform if features is None else uniform + float(weights[0])
+    return Fit(level, weights if features is None else weights[1:], loss, costs, int(found.nit), bool(found.success))
+
+
+def _design(graph: WalkGraph, features: FeatureMap | None) -> Floats:
+    """``(n, k)``: one column per cell, or one of ones and then the features."""
+    if features is None:
+        return np.eye(len(graph.cells))
+    matrix = _features_of(graph, features)
+    return np.hstack([np.ones((len(matrix), 1)), matrix])
 
 
 def _features_of(graph: WalkGraph, features: FeatureMap) -> Floats:
