@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import itertools
 import math
+import os
 import pickle
+import subprocess
+import sys
 from collections import Counter
 
 import gymnasium as gym
@@ -373,6 +376,8 @@ def test_impossible_tasks():
         (lambda: BoltzmannWalker(rationality=math.inf), "rationality"),
         (lambda: BoltzmannWalker(idle=0.9, turn=0.1), "less than 1"),
         (lambda: BoltzmannWalker(tick=-1), "tick"),
+        (lambda: BoltzmannWalker(preferences=[[1.0, 0.0]]), "greater than 0"),
+        (lambda: BoltzmannWalker(preferences=[[1.0, math.nan]]), "greater than 0"),
         (lambda: PlannerWalker(depth=0), "depth"),
         (lambda: PlannerWalker(depth=2.0), "depth"),  # type: ignore[arg-type]
         (lambda: PlannerWalker(fade=1.0), "fade"),
@@ -407,7 +412,46 @@ def test_one_cell_says_no_more_than_the_prior(walker):
             assert right < prior + 0.25
 
 
+def test_one_cell_of_recorded_play_says_no_more_than_the_prior():
+    try:
+        walks = recorded_trajectories(layouts=["coordination_ring"])
+    except RecordingsError as error:
+        pytest.skip(str(error))
+    rows = BayesianGoalPredictor().fit(walks).predict_proba([walk.first(1) for walk in walks])
+    assert rows.max(axis=1) == pytest.approx([1 / len(walk.candidates) for walk in walks])
+
+
 # -- at play -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_kernels_run_as_plain_python():
+    """Numba's generator of random numbers is numpy's, so that even samples are the same."""
+    code = (
+        "import numpy as np\n"
+        "from legible_envs.overcooked import OvercookedWorkspace\n"
+        "from legible_envs.overcooked.humans import fit_rationality, simulate_participants\n"
+        "ws = OvercookedWorkspace((5, 5), human='boltzmann', rationality=1.1)\n"
+        "genome = ws.sample(1, np.random.default_rng(0))[0]\n"
+        "people = [simulate_participants(ws.decode(genome), 1, np.random.default_rng(0), walker=name)\n"
+        "          for name in ('boltzmann', 'planner')]\n"
+        "print(ws.legibility(genome), *[walk.states.sum() for walks in people for walk in walks])\n"
+        "print(*[round(float(walk.times[-1]), 6) for walks in people for walk in walks])\n"
+        "print(fit_rationality(people[0] + people[1]).interval)"
+    )
+    outputs = [
+        subprocess.run(
+            [sys.executable, "-c", code],
+            env={**os.environ, "NUMBA_DISABLE_JIT": disable},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout.split()
+        for disable in ("0", "1")
+    ]
+    numbers = [[float(word.strip("(),")) for word in output] for output in outputs]
+    assert len(numbers[0]) == 1 + 24 + 24 + 2
+    assert numbers[0] == pytest.approx(numbers[1], rel=1e-9)
 
 
 def test_players_finish_any_valid_kitchen():

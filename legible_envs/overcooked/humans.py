@@ -99,8 +99,8 @@ class BoltzmannWalker(Walker):
             shape: Of the kitchens the person has preferences in.
             rng: Source of randomness.
             rationality: Of the median person.
-            spread: Standard deviation of log rationality between people. In the recorded kitchens
-                :func:`rationality_spread` finds .13, .22, .40 and .25, with the error of each estimate left in up to .44.
+            spread: Standard deviation of log rationality between people. :func:`rationality_spread` finds .13, .22,
+                .40 and .25 in the four recorded kitchens.
             preference: Standard deviation of the log cost of each cell; 0 for people without preferences.
             **arguments: See :class:`Walker`.
         """

@@ -115,7 +115,7 @@ def fit_rationality(
         >>> there_and_back = [(1, 3), (1, 2), (1, 3), (1, 2), (1, 1), (0, 1)]
         >>> walk = Trajectory(there_and_back, goal="onion", candidates=("onion",), layout=kitchen)
         >>> round(fit_rationality([walk]).rationality, 3)
-        0.549
+        0.347
     """
     walks = list(trajectories)
     if not 0 < confidence < 1:

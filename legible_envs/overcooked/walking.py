@@ -57,6 +57,8 @@ class Walker(ABC):
         if self.idle + self.turn >= 1:
             raise ValueError(f"idle + turn must be less than 1, got {idle!r} + {turn!r}: nobody would ever move")
         self.preferences = None if preferences is None else np.array(preferences, dtype=np.float64)
+        if self.preferences is not None and not ((self.preferences > 0) & (self.preferences < np.inf)).all():
+            raise ValueError("preferences are costs of stepping on cells: they must be finite and greater than 0")
         self._ways = lru_cache(maxsize=256)(self._find_way)
 
     @property
@@ -205,14 +207,17 @@ def draw_one(cells: Sequence[Cell], what: str, rng: np.random.Generator) -> Cell
     return cells[int(rng.integers(len(cells)))]
 
 
+@lru_cache(maxsize=512)
+def _shortest_way(layout: OvercookedLayout, name: str) -> Way:
+    """The way of a person without preferences, who counts steps."""
+    return make_way(layout, layout.stations[name])
+
+
 def in_reach(layout: OvercookedLayout, cell: Cell, kind: str) -> list[str]:
     """Stations of one type that can be walked to, the nearest first."""
-    away = layout.distances_from([cell])
-    nearest = {
-        name: min((int(away[c]) for c in layout.access(name) if away[c] >= 0), default=-1)
-        for name in layout.named(kind)
-    }
-    found = sorted((name for name, moves in nearest.items() if moves >= 0), key=lambda name: nearest[name])
+    at = cell[0] * layout.shape[1] + cell[1]
+    steps = {name: float(_shortest_way(layout, name).best[at]) for name in layout.named(kind)}
+    found = sorted((name for name in steps if steps[name] < np.inf), key=lambda name: steps[name])
     if not found:
         raise LayoutError(
             f"no {kind} station can be reached from row {cell[0]}, column {cell[1]}; the task needs one",
