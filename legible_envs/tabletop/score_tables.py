@@ -15,7 +15,7 @@ from legible_envs.tasks import Stage, TaskGraph
 
 __all__ = ["make_tables", "observed_fractions"]
 
-MAX_GOALS = 16
+MAX_GOALS = 12
 POINTS = 10
 
 
@@ -59,7 +59,7 @@ def make_tables(
         tie_tolerance: Excess costs up to this tie, in metres.
 
     Raises:
-        TaskError: The task names a place the table lacks, or has more than 16 goals that are candidates together.
+        TaskError: The task names a place the table lacks, or has more than 12 goals that are candidates together.
     """
     unknown = [place for place in task.places if place not in points]
     if unknown:

@@ -59,7 +59,7 @@ class TabletopScorer:
         best_possible: The score of reaches read from the start on: ``sum of w |V|``.
 
     Raises:
-        TaskError: The task has more than 16 goals that are candidates together.
+        TaskError: The task has more than 12 goals that are candidates together.
         ValueError: A parameter is out of range.
     """
 
