@@ -92,23 +92,22 @@ def train(
             name: torch.tensor(value, dtype=torch.float32, device=device, requires_grad=True)
             for name, value in weights.items()
         }
-        data = _Data(torch, device, examples, held_out)
+        data = _Data(torch, device, examples)
         optimizer = torch.optim.AdamW(
             parameters.values(), lr=settings.learning_rate, weight_decay=settings.weight_decay
         )
         keeper = _Keeper(torch, parameters, settings)
-        validation = np.flatnonzero(held_out.any(axis=0)) if held_out.any() else np.arange(len(examples.goals))
+        judged, judged_weights = _rows_to_judge(held_out)
         history: list[npt.NDArray[np.float64]] = []
         while len(history) < settings.max_epochs and not keeper.finished:
             for batch in _batches(examples.lengths, settings.batch_size, rng):
                 optimizer.zero_grad()
-                training, count = data.losses(network, operations, parameters, batch)[0]
-                (training / count.clip(min=1.0)).sum().backward()
+                losses = data.losses(network, operations, parameters, batch[None], ~held_out[:, batch])
+                losses.sum().backward()
                 optimizer.step()
             with torch.no_grad():
-                losses = data.losses(network, evaluation, parameters, validation)
-                total, count = losses[1] if held_out.any() else losses[0]
-                history.append((total / count).cpu().numpy().astype(np.float64))
+                losses = data.losses(network, evaluation, parameters, judged, judged_weights)
+            history.append(losses.cpu().numpy().astype(np.float64))
             keeper.judge(history[-1])
         trained = {name: value.cpu().numpy().astype(np.float64) for name, value in keeper.best.items()}
     return trained, np.array(history)
@@ -117,32 +116,33 @@ def train(
 class _Data:
     """Examples on the device."""
 
-    def __init__(self, torch: Any, device: Any, examples: Examples, held_out: npt.NDArray[np.bool_]) -> None:
+    def __init__(self, torch: Any, device: Any, examples: Examples) -> None:
         self._torch = torch
+        self._device = device
         self._lengths = examples.lengths
         steps = np.arange(examples.inputs.shape[1])
-        weights = (steps < examples.lengths[:, None]) / examples.lengths[:, None]
+        shares = (steps < examples.lengths[:, None]) / examples.lengths[:, None]
         self._inputs = torch.as_tensor(examples.inputs, dtype=torch.float32, device=device)
-        self._weights = torch.as_tensor(weights, dtype=torch.float32, device=device)
+        self._shares = torch.as_tensor(shares, dtype=torch.float32, device=device)
         self._closed = torch.as_tensor(np.where(examples.allowed, 0.0, -1e9), dtype=torch.float32, device=device)
         self._goals = torch.as_tensor(examples.goals, dtype=torch.long, device=device)
-        self._held_out = torch.as_tensor(held_out, dtype=torch.float32, device=device)
 
     def losses(
-        self, network: Network, operations: Operations, parameters: dict[str, Any], rows: npt.NDArray[np.intp]
-    ) -> tuple[tuple[Any, Any], tuple[Any, Any]]:
-        """Sum of losses and number of trajectories ``(M,)``: those trained on, those held out."""
+        self,
+        network: Network,
+        operations: Operations,
+        parameters: dict[str, Any],
+        rows: npt.NDArray[np.intp],
+        weights: npt.NDArray[np.bool_],
+    ) -> Any:
+        """``(M,)`` mean losses over rows ``(1 or M, b)``, the same or others for each member, that have a weight."""
         longest = int(self._lengths[rows].max())
-        logits, _ = network(operations, parameters, self._inputs[rows, :longest][None])
-        logs = self._torch.log_softmax(logits + self._closed[rows][:, None], dim=-1)
-        goals = self._goals[rows][None, :, None, None].expand(*logs.shape[:3], 1)
-        surprise = -(logs.gather(-1, goals)[..., 0] * self._weights[rows, :longest]).sum(-1)
-        held_out = self._held_out[:, rows]
-        trained_on = 1.0 - held_out
-        return (
-            ((surprise * trained_on).sum(1), trained_on.sum(1)),
-            ((surprise * held_out).sum(1), held_out.sum(1)),
-        )
+        logits, _ = network(operations, parameters, self._inputs[rows, :longest])
+        logs = self._torch.log_softmax(logits + self._closed[rows][:, :, None], dim=-1)
+        goals = self._goals[rows][:, :, None, None].expand(*logs.shape[:3], 1)
+        surprise = -(logs.gather(-1, goals)[..., 0] * self._shares[rows, :longest]).sum(-1)
+        counted = self._torch.as_tensor(weights, dtype=self._torch.float32, device=self._device)
+        return (surprise * counted).sum(1) / counted.sum(1).clip(min=1.0)
 
 
 class _Keeper:
@@ -183,6 +183,16 @@ def _held_out(goals: npt.NDArray[np.intp], settings: Training, rng: np.random.Ge
     for member in range(settings.members):
         held_out[member] = fold == member % folds
     return held_out
+
+
+def _rows_to_judge(held_out: npt.NDArray[np.bool_]) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.bool_]]:
+    """Rows ``(1 or M, v)`` and whether they count ``(M, v)``: what each member holds out, or all if nothing is."""
+    members, number = held_out.shape
+    if not held_out.any():
+        return np.arange(number)[None], np.ones((members, number), dtype=bool)
+    longest = held_out.sum(axis=1).max()
+    order = np.argsort(~held_out, axis=1, kind="stable")[:, :longest]
+    return order, np.take_along_axis(held_out, order, axis=1)
 
 
 def _batches(lengths: npt.NDArray[np.intp], size: int, rng: np.random.Generator) -> Iterator[npt.NDArray[np.intp]]:
