@@ -52,6 +52,10 @@ class _MomentClassifier(GoalPredictor):
     def _make(self, moments: int) -> Any:
         """An unfitted classifier for so many moments."""
 
+    def _smoothed(self, weights: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """``(n, G)`` probabilities of the classifier, as they are unless it is surer than it can be."""
+        return weights
+
     def predict_proba(self, X: Sequence[Trajectory]) -> npt.NDArray[np.float64]:
         """See :meth:`GoalPredictor.predict_proba`."""
         walks = self._check_trajectories(X)
@@ -85,7 +89,7 @@ class _MomentClassifier(GoalPredictor):
         weights = np.tile(self.prior_, (len(walks), 1))
         seen = [i for i, row in enumerate(rows) if row is not None]
         if seen and self._classifier is not None:
-            weights[seen] = self._classifier.predict_proba(np.array([rows[i] for i in seen]))
+            weights[seen] = self._smoothed(self._classifier.predict_proba(np.array([rows[i] for i in seen])))
         probabilities = np.zeros((len(walks), len(self.classes_)))
         places = np.searchsorted(self.classes_, self.goals_)
         for i, candidates in enumerate(columns):
@@ -128,6 +132,8 @@ class ReachLogistic(_MomentClassifier):
 class ReachNeighbours(_MomentClassifier):
     """The goals of the most similar moments of earlier reaches, by standardised position, velocity and time.
 
+    The prior votes like one more neighbour, so that nothing is impossible because few moments were asked.
+
     Args:
         n_neighbors: How many moments vote; all if there are fewer.
 
@@ -143,7 +149,11 @@ class ReachNeighbours(_MomentClassifier):
     def _make(self, moments: int) -> Any:
         if isinstance(self.n_neighbors, bool) or not isinstance(self.n_neighbors, int) or self.n_neighbors < 1:
             raise ValueError(f"`n_neighbors` must be an integer >= 1, got {self.n_neighbors!r}")
-        return make_pipeline(StandardScaler(), KNeighborsClassifier(min(self.n_neighbors, moments)))
+        self.n_neighbors_ = min(self.n_neighbors, moments)
+        return make_pipeline(StandardScaler(), KNeighborsClassifier(self.n_neighbors_))
+
+    def _smoothed(self, weights: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        return (self.n_neighbors_ * weights + self.prior_) / (self.n_neighbors_ + 1)
 
 
 def _moments(walk: Trajectory) -> npt.NDArray[np.float64]:
