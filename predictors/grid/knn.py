@@ -24,7 +24,7 @@ class GridNeighbours(PrefixPredictor):
     not depend on the order of the walks; the prior counts as one more neighbour.
 
     Args:
-        k: Number of neighbours, in walks: prefixes that many walks share are many.
+        k: Number of neighbours; all prefixes of one walk together count as one.
 
     Attributes:
         classes_: ``(K,)`` names of all goals and candidates seen in ``fit``, sorted.

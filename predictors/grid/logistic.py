@@ -16,8 +16,8 @@ __all__ = ["GridLogistic"]
 class GridLogistic(PrefixPredictor):
     """Logistic regression from a prefix to the goal.
 
-    Features are those of :class:`~predictors.grid.prefixes.PrefixEncoder`; every prefix of every walk is an example, a
-    walk's examples weigh 1 together. Answers are shrunk toward the prior as if each goal had been seen once more.
+    Features are those of :class:`~predictors.grid.prefixes.PrefixEncoder`; every prefix of every walk is an example,
+    those of one walk weigh 1 together. Answers are shrunk toward the prior as if each goal had been seen once more.
 
     Args:
         C: Inverse strength of the L2 penalty.

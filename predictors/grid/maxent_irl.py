@@ -52,7 +52,8 @@ class MaxEntIRL(GridPredictor):
             reading order, for kitchens of that shape, or a function that returns them for a layout; the ``k`` weights
             are shared by all kitchens.
         l2: Strength of the pull toward the uniform cost, above 0. On some hundred recorded walks per kitchen less pull
-            (1) makes unseen walks a little more likely, by .01 to .03 nats each, and reads goals no better.
+            (1) makes unseen walks a little more likely, by .01 to .03 nats each; goals are then read better in some
+            kitchens and worse in others.
         prior: ``"uniform"`` over candidates, or ``"empirical"``: as often as each was chosen in ``fit``.
         max_iter: Most iterations of L-BFGS.
         tol: Largest component of the gradient, per walk, at which the fit is done.
@@ -60,7 +61,7 @@ class MaxEntIRL(GridPredictor):
     Attributes:
         classes_: ``(K,)`` names of all goals and candidates seen in ``fit``, sorted.
         uniform_cost_: Best uniform cost per step, the rationality of the people in nats per step.
-        costs_: Learned cost of entering each cell, ``{layout: (H, W)}``, NaN where no walk can go.
+        costs_: Learned cost of entering each cell, ``{layout: (H, W)}``, NaN where nobody can stand.
         cost_: That of the only kitchen; absent where there are several.
         reward_: ``-cost_``.
         intercept_: The level ``u``.
@@ -150,8 +151,11 @@ class MaxEntIRL(GridPredictor):
         found = minimise(evidence, features, self.uniform_cost_, self.l2, self.max_iter, self.tol)
         self.n_iter_ = max(self.n_iter_, found.iterations)
         self.converged_ = self.converged_ and found.converged
-        self.costs_.update(found.costs)
         self.intercept_ = found.level
+        for layout, costs in found.costs.items():  # rooms without walks are left out there
+            merged = np.where(np.isnan(costs), self._expected_costs(layout, found.weights), costs)
+            merged.flags.writeable = False
+            self.costs_[layout] = merged
         return found.weights, found.loss
 
     def _check_parameters(self) -> None:
@@ -173,15 +177,15 @@ class MaxEntIRL(GridPredictor):
     def cost_map(self, layout: OvercookedLayout) -> Floats:
         """``(H, W)`` cost of entering each cell of a kitchen, also of one never seen.
 
-        NaN where no walk can go. A kitchen never seen has the uniform cost, or that of its features.
+        NaN where nobody can stand. A kitchen never seen has the uniform cost, or that of its features.
         """
-        if layout in self.costs_:
-            return self.costs_[layout]
-        costs = np.full(layout.shape, np.nan)
-        floor = layout.cells == 0
-        costs[floor] = self.intercept_
+        return self.costs_[layout] if layout in self.costs_ else self._expected_costs(layout, self.coef_)
+
+    def _expected_costs(self, layout: OvercookedLayout, weights: Any) -> Floats:
+        """``(H, W)`` costs where there were no walks."""
+        costs = np.where(layout.cells == 0, self.intercept_, np.nan)
         if not isinstance(self.features, str):
-            costs[floor] += (np.asarray(self._feature_map()(layout)) @ self.coef_).reshape(layout.shape)[floor]
+            costs += (np.asarray(self._feature_map()(layout)) @ weights).reshape(layout.shape)
         return costs
 
     def goal_costs(self, layout: OvercookedLayout, goals: tuple[str, ...]) -> Floats:

@@ -147,8 +147,8 @@ def distinct_prefixes(
         classes: ``(K,)`` names of goals.
 
     Returns:
-        ``(U, width)`` features, and ``(U, K)`` weights: how many walks to each goal have this prefix, every walk's
-        prefixes weighing 1 together.
+        ``(U, width)`` features, and ``(U, K)`` weights: how many walks to each goal have this prefix, each counting by
+        the share of it that one cell is: who is judged at fractions observed meets the cells of short walks more often.
     """
     column = {name: number for number, name in enumerate(classes.tolist())}
     rows: dict[tuple[object, ...], int] = {}
