@@ -279,7 +279,8 @@ def learning_curve(
     Args:
         predictors: As for :func:`evaluate`.
         X: Complete trajectories with known goals.
-        sizes: Training sizes: whole numbers of trajectories, or shares (floats <= 1) of those not held out.
+        sizes: Training sizes: whole numbers of trajectories, or shares (floats <= 1) of those not held out
+            (with groups, of the fewest in any repeat).
         test_share: Share held out.
         repeats: How often, with other splits.
         fractions: Fractions observed.
@@ -301,10 +302,12 @@ def learning_curve(
     named = _named(predictors)
     rng = np.random.default_rng(seed)
     rows = []
-    for repeat in range(repeats):
-        pool, test = nested_training_sets(walks, test_share, rng, groups)
+    splits = [nested_training_sets(walks, test_share, rng, groups) for _ in range(repeats)]
+    # Groups are of different sizes: the smallest pool decides, so that every repeat has the same training sizes.
+    counts = _sizes(sizes, min(len(pool) for pool, _ in splits))
+    for repeat, (pool, test) in enumerate(splits):
         judged = [walks[i] for i in test]
-        for size in _sizes(sizes, len(pool)):
+        for size in counts:
             learned = [walks[i] for i in pool[:size]]
             _check_known(learned, judged)
             for name, predictor in named.items():

@@ -79,8 +79,9 @@ def compare_conditions(
     Args:
         results: An evaluation, its ``table``, or several by the name of their condition (which then is the factor).
         factor: The column to compare: ``"condition"``, ``"layout"`` or ``"predictor"``.
-        unit: What is independent: values are averaged within each before anything is tested. ``"fold"`` is the
-            practice of treating folds as samples; it is warned about.
+        unit: What is independent: values are averaged within each before anything is tested, so that a person counts
+            once, however many walks are recorded; means differ from those over walks. ``"fold"`` is the practice of
+            treating folds as samples; it is warned about.
         design: ``"within"`` is a repeated-measures ANOVA, for the same units in every condition; ``"between"`` the
             one-way ANOVA. ``"auto"`` takes ``"within"`` if all units are in all conditions and ``"between"`` if none is
             in two.

@@ -362,6 +362,10 @@ def test_learning_curves_nest_their_training_sets_and_hold_the_test_share() -> N
 def test_learning_curves_can_hold_out_people() -> None:
     found = learning_curve(Strangers(), people(60), sizes=(0.5, 1.0), groups="participant", repeats=2)
     assert set(found.table["repeat"]) == {0, 1}
+    assert found.summary()["repeats"].tolist() == [
+        2,
+        2,
+    ]  # the same sizes in all repeats, however many walks people have
 
 
 @pytest.mark.parametrize(
