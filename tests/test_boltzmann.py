@@ -22,7 +22,7 @@ from legible_envs.overcooked.boltzmann import (
 )
 from legible_envs.overcooked.scoring import ambiguity, explain_layout, grid_graph, score_layout
 from legible_envs.tasks import Subtask, TaskGraph
-from legible_envs.workspace import make_workspace
+from legible_envs.workspace import check_workspace, make_workspace
 
 TINY = [
     OvercookedLayout.from_ascii("XOXTX\nX   X\nXXSXX"),
@@ -265,6 +265,7 @@ def test_settings_are_kept_and_checked():
     for again in (make_workspace(ws.to_config()), pickle.loads(pickle.dumps(ws))):
         assert again == ws
         assert again.to_config()["rationality"] == DEFAULT_RATIONALITY
+    check_workspace(ws)
     assert ws != OvercookedWorkspace((5, 5))
     summary = ws.summary(ws.sample(1, np.random.default_rng(0))[0])
     assert {key: summary[key] for key in ("human", "rationality", "horizon")} == {

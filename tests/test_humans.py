@@ -469,6 +469,22 @@ def test_players_finish_any_valid_kitchen():
             assert info["deliveries"] == 3
 
 
+def test_players_keep_off_soft_obstacles():
+    layout = OvercookedLayout.from_ascii("XPXXXXX\nO  V  T\nX  V  X\nD     F\nXCXXSXX")
+    crossings = {}
+    for kind in ("hard", "soft"):
+        env = gym.make("LegibleOvercooked-v0", layout=layout, shape=(5, 7), virtual_obstacles=kind)
+        player = BoltzmannWalker(1.5, idle=0.0).policy(env.unwrapped, np.random.default_rng(0))
+        obs, info = env.reset(seed=0)
+        for _ in range(300):
+            obs, _, terminated, _, info = env.step(player(obs, info))
+            if terminated:
+                break
+        crossings[kind] = info["crossings"]
+        assert info["deliveries"] > 0
+    assert crossings == {"hard": 0, "soft": 0}
+
+
 def test_players_in_vector_environments():
     envs = gym.make_vec("LegibleOvercooked-v0", num_envs=3, vectorization_mode="vector_entry_point", shape=(5, 5))
     player = BoltzmannWalker(2.0).policy(envs, np.random.default_rng(0))
