@@ -25,7 +25,7 @@ __all__ = ["FOLDER", "Reading", "print_reading", "read_walks", "reading_section"
 FOLDER: Final = "people"
 """Where in a run's folder ``legible score RUN --predictor`` writes."""
 _FILE: Final = "reading.json"
-_FIGURES: Final = ("accuracy", "confusion", "learning_curve")
+_FIGURES: Final = ("accuracy", "learning_curve", "confusion")
 _CONFUSION_AT: Final = 0.5
 
 

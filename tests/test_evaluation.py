@@ -392,3 +392,20 @@ def test_small_training_sets_must_have_heard_of_all_goals() -> None:
 
 def test_the_examples_of_the_contract_can_be_evaluated() -> None:
     assert len(evaluate("bayesian", example_walks(), cv=2, repeats=1, rare="keep").table) == 8 * 9
+
+
+@pytest.mark.data
+def test_recorded_people_are_read_as_measured_before() -> None:
+    from legible_envs.overcooked.recordings import RecordingsError, recorded_trajectories
+
+    try:
+        walks = recorded_trajectories(None, ["cramped_room"])
+    except RecordingsError as error:
+        pytest.skip(str(error))
+    found = evaluate(["bayesian", "shortest-distance"], walks, cut="cells")
+    assert found.summary()["trajectories"].tolist() == [424, 424]
+    assert found.summary()["accuracy"].tolist() == pytest.approx([0.471, 0.350], abs=0.001)
+    grouped = evaluate("bayesian", walks, cut="cells", groups="participant", repeats=1)
+    assert grouped.summary()["accuracy"].iloc[0] == pytest.approx(0.471, abs=0.001)
+    compared = compare_conditions(found, factor="predictor", at="mean")
+    assert (compared.design, compared.means["n"].tolist()) == ("within", [32, 32])
