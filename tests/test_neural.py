@@ -11,9 +11,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pointing import grouped_accuracy, needs_pointing
 from sklearn.base import clone
 from sklearn.exceptions import NotFittedError
+from sklearn.model_selection import StratifiedKFold
 
+from legible_envs.overcooked.recordings import RecordingsError, recorded_trajectories
 from legible_envs.rollouts import Trajectory
 from predictors import RecurrentPredictor, TransformerPredictor, check_predictor, make_predictor
 from predictors.checks import example_walks
@@ -247,6 +250,35 @@ def test_candidates_alone_are_possible(on_cells: NeuralPredictor) -> None:
     assert row[on_cells.classes_.tolist().index("dish")] == 0
     only = Trajectory(walk.states[:2], start="serving", candidates=("onion",), layout=walk.layout, complete=False)
     assert on_cells.predict_proba([only])[0].tolist() == [0.0, 1.0, 0.0]
+
+
+# -- real people ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+@pytest.mark.data
+@pytest.mark.timeout(1200)
+@pytest.mark.parametrize(
+    ("layout", "known"),
+    [("asymmetric_advantages", 0.935), ("coordination_ring", 0.439), ("cramped_room", 0.676), ("random3", 0.488)],
+)
+def test_reads_recorded_people_as_well_as_a_gru_did_before(layout: str, known: float) -> None:
+    try:
+        walks = recorded_trajectories(None, [layout], "all")
+    except RecordingsError as error:
+        pytest.skip(str(error))
+    scores = np.zeros(len(walks))
+    for train, test in StratifiedKFold(4, shuffle=True, random_state=0).split(walks, [w.goal for w in walks]):
+        predictor = RecurrentPredictor().fit([walks[i] for i in train])
+        scores[test] = [predictor.score([walks[i]], cut="cells") for i in test]
+    assert scores.mean() > known - 0.02
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1200)
+@needs_pointing
+def test_reads_real_pointing_as_well_as_a_gru_did_before() -> None:
+    assert grouped_accuracy(RecurrentPredictor()) > 0.798 - 0.015
 
 
 # -- files ------------------------------------------------------------------------------------------------------------

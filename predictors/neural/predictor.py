@@ -81,8 +81,8 @@ class NeuralPredictor(GoalPredictor):
         """
         settings = self._settings()
         network = self._network()
-        super().fit(X, y)
         walks = self._check_trajectories(X)
+        super().fit(walks)
         self.goal_columns(walks)
         encoding = Encoding.learn(walks)
         self._check_walks(walks)
@@ -274,9 +274,10 @@ class NeuralPredictor(GoalPredictor):
 
 
 class NeuralStream(GoalStream):
-    """A neural predictor's belief about one person; every update costs the same, however long the way so far.
+    """A neural predictor's belief about one person, which goes on from what the networks remember.
 
-    (A transformer's grows slowly: it looks back at every state.)
+    Each update runs the networks on one state: recurrent ones carry their hidden vectors, transformers their keys and
+    values.
     """
 
     def __init__(self, predictor: NeuralPredictor, context: Trajectory) -> None:

@@ -50,7 +50,7 @@ class TransformerPredictor(NeuralPredictor):
         dropout: float = 0.2,
         batch_size: int = 64,
         max_epochs: int = 100,
-        patience: int = 10,
+        patience: int = 8,
         validation_fraction: float = 0.2,
         device: str = "auto",
         random_state: int = 0,
