@@ -63,7 +63,7 @@ GAUSSIANS = [
     )
 ]
 BLIND = [ShortestDistance("euclidean"), StraightLineBayesian()]
-TRAINED = [ReachLogistic(), ReachLogistic(degree=2), ReachNeighbours()]
+TRAINED = [ReachLogistic(), ReachNeighbours()]
 EVERY: list[GoalPredictor] = [*GAUSSIANS, *BLIND, *TRAINED]
 every = pytest.mark.parametrize("predictor", EVERY, ids=lambda p: repr(p)[:60])
 
@@ -161,6 +161,10 @@ def test_refuses_what_it_cannot_read(predictor: GoalPredictor) -> None:
         with pytest.raises(ValueError, match=r"finite|dimension|backwards"):
             stream.update(bad, when)
         assert stream.belief == before
+
+
+def test_squares_and_products_are_a_predictor_too() -> None:
+    check_predictor(ReachLogistic(degree=2), TRAIN[:12])
 
 
 def test_positions_must_be_finite() -> None:
