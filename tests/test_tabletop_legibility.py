@@ -13,7 +13,7 @@ from table_oracle import PathOracle, legibility
 
 from legible_envs.errors import LayoutError, TaskError
 from legible_envs.tabletop import TableObject, TabletopLayout, TabletopTask, VirtualObstacle
-from legible_envs.tabletop.legibility import exponentials
+from legible_envs.tabletop.evidence import exponentials
 from legible_envs.tabletop.scoring import TabletopScorer
 from legible_envs.tasks import Subtask, TaskGraph
 
@@ -139,7 +139,7 @@ def test_two_goals_by_hand():
 
 def test_one_goal_is_certain():
     task = reach_task("only")
-    assert TabletopScorer(task).layout(task.layout).legibility.tolist() == [1.0]
+    assert TabletopScorer(task).layout(task.layout).legibility[0] == pytest.approx(1, abs=1e-12)
 
 
 @pytest.mark.parametrize(("ties", "wrong"), [("expected", 0.5), ("strict", 1.0)])

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.compiled import kernel
+from legible_envs.tabletop.evidence import add_weighted, exponentials, value_in_all_stages
 from legible_envs.tabletop.visibility import (
     SHRINK,
     Floats,
@@ -44,9 +45,8 @@ class ReachTables(NamedTuple):
         group_offset: ``[Q + 1]`` where each group's goals begin in the arrays below.
         goal_target: ``[R]`` each goal of each group, as a position in ``targets``.
         reach_weight: ``[R]`` expected number of such reaches, divided by that of all reaches.
-        stage_offset: ``[Q + 1]`` where each group's stages begin.
-        stage_mask: ``[A]`` valid goals of each stage, bit ``i`` for the group's goal ``i``.
-        stage_weight: ``[A]`` expected visits.
+        stage_weights: ``[R, S]`` for each goal and each set of other goals of its group it may be valid with: the
+            expected visits of that stage, divided by ``K`` and repeated ``K`` times (the set changes fastest).
         leg_from: ``[L]`` point each leg of the task leaves from.
         leg_target: ``[L]`` position in ``targets`` of the point it leads to.
         leg_weight: ``[L]`` expected number of such legs.
@@ -62,9 +62,7 @@ class ReachTables(NamedTuple):
     group_offset: Ints
     goal_target: Ints
     reach_weight: Floats
-    stage_offset: Ints
-    stage_mask: Ints
-    stage_weight: Floats
+    stage_weights: Floats
     leg_from: Ints
     leg_target: Ints
     leg_weight: Floats
@@ -90,13 +88,11 @@ class Scratch(NamedTuple):
     observed: Floats
     excess: Floats
     evidence: Floats
-    tied: Floats
     blocked: npt.NDArray[np.bool_]
     box_u: Floats
     box_v: Floats
+    value: Floats
     total: Floats
-    greatest: Floats
-    ties: Floats
     sums: Floats
 
 
@@ -121,14 +117,12 @@ def make_scratch(num_obstacles: int, tables: ReachTables) -> Scratch:
         np.empty(most * k),
         np.empty((most, most * k)),
         np.empty((most, most * k)),
-        np.empty((most, most * k)),
         np.empty((most, most * k), dtype=np.bool_),
         np.empty((num_obstacles, most * k)),
         np.empty((num_obstacles, most * k)),
-        np.empty((1 << most, most * k)),
-        np.empty((1 << most, most * k)),
-        np.empty((1 << most, most * k)),
-        np.empty(k),
+        np.empty(tables.stage_weights.shape[1]),
+        np.empty(tables.stage_weights.shape[1]),
+        np.empty(tables.stage_weights.shape[1]),
     )
 
 
@@ -238,120 +232,33 @@ def detour_excess(
 
 
 @kernel
-def exponentials(beta: float, excess: Floats, evidence: Floats) -> None:
-    """``evidence = exp(-beta * excess)`` to an absolute error of 1e-14, without calls, so that it is vectorised.
-
-    The Taylor series of degree 8 at a sixty-fourth of the exponent, squared six times; exponents beyond 40 (4e-18) are
-    cut off there.
-    """
-    for p in range(len(excess)):
-        x = beta * excess[p]
-        x = x if x > 0.0 else 0.0
-        x = (x if x < 40.0 else 40.0) * (-1.0 / 64.0)
-        y = 1.0 + x / 8.0
-        y = 1.0 + x * y * (1.0 / 7.0)
-        y = 1.0 + x * y * (1.0 / 6.0)
-        y = 1.0 + x * y * (1.0 / 5.0)
-        y = 1.0 + x * y * (1.0 / 4.0)
-        y = 1.0 + x * y * (1.0 / 3.0)
-        y = 1.0 + x * y * (1.0 / 2.0)
-        y = 1.0 + x * y
-        y *= y
-        y *= y
-        y *= y
-        y *= y
-        y *= y
-        evidence[p] = y * y
-
-
-@kernel
-def weigh_evidence(
-    num_goals: int, num_points: int, per_goal: int, beta: float, tie_tolerance: float, scratch: Scratch
-) -> None:
-    """From excess costs to Eq. 1's weights and to which goals tie with the true one."""
-    for g in range(num_goals):
-        excess, evidence, tied = scratch.excess[g], scratch.evidence[g], scratch.tied[g]
-        for p in range(g * per_goal, (g + 1) * per_goal):
-            excess[p] = 0.0
-        exponentials(beta, excess[:num_points], evidence)
-        for p in range(num_points):
-            tied[p] = 1.0 if excess[p] <= tie_tolerance else 0.0
-
-
-@kernel
-def add_goal(without: Floats, goal: Floats, together: Floats) -> None:
-    """``together = without + goal``, element by element (a call of its own, so that it is vectorised)."""
-    for p in range(len(goal)):
-        together[p] = without[p] + goal[p]
-
-
-@kernel
-def take_greater(without: Floats, goal: Floats, together: Floats) -> None:
-    """``together = max(without, goal)``, element by element."""
-    for p in range(len(goal)):
-        together[p] = goal[p] if goal[p] > without[p] else without[p]
-
-
-@kernel
-def sum_subsets(num_goals: int, num_points: int, scratch: Scratch) -> None:
-    """For every set of goals (a row, bit ``g`` for goal ``g``) the sum, the greatest and the ties of its evidence."""
-    scratch.total[0] = 0.0
-    scratch.greatest[0] = 0.0
-    scratch.ties[0] = 0.0
-    for g in range(num_goals):
-        for rest in range(1 << g):
-            mask = rest | 1 << g
-            add_goal(scratch.total[rest], scratch.evidence[g, :num_points], scratch.total[mask])
-            take_greater(scratch.greatest[rest], scratch.evidence[g, :num_points], scratch.greatest[mask])
-            add_goal(scratch.ties[rest], scratch.tied[g, :num_points], scratch.ties[mask])
-
-
-@kernel
-def add_reach(
-    total: Floats,
-    second: Floats,
-    ties: Floats,
-    observed: Floats,
-    weight: float,
-    penalty: float,
-    strict: bool,
-    sums: Floats,
-) -> None:
-    """Add ``weight`` times Eq. 2 to ``sums [K]``, for the ``K`` points of one reach in one stage."""
-    for k in range(len(sums)):
-        is_tie = ties[k] > 1.5
-        share = 1.0 if strict else ties[k] - 1.0
-        parts = 1.0 if strict else ties[k]
-        value = -penalty * observed[k] * share if is_tie else 1.0 - second[k]
-        sums[k] += weight * (value / (parts if is_tie else total[k]))
-
-
-@kernel
-def group_value(q: int, num_goals: int, tables: ReachTables, scratch: Scratch) -> float:
+def group_value(first: int, num_goals: int, num_points: int, tables: ReachTables, scratch: Scratch) -> float:
     """Sum over the stages of one group, and over their valid goals, of weight times E[EnvLegibility] (Eq. 2)."""
     per_goal = len(tables.fractions)
-    sums = scratch.sums
+    num_sets = 1 << (num_goals - 1)
+    used = num_sets * per_goal
+    excess, evidence = scratch.excess, scratch.evidence
+    sums = scratch.sums[:used]
     sums[:] = 0.0
-    certain = 0.0
-    for s in range(tables.stage_offset[q], tables.stage_offset[q + 1]):
-        mask, weight = tables.stage_mask[s], tables.stage_weight[s]
-        if mask & (mask - 1) == 0:
-            certain += weight  # a single goal: there is nothing to doubt
-            continue
-        for g in range(num_goals):
-            if mask >> g & 1:
-                begin, end = g * per_goal, (g + 1) * per_goal
-                add_reach(
-                    scratch.total[mask, begin:end],
-                    scratch.greatest[mask ^ 1 << g, begin:end],
-                    scratch.ties[mask, begin:end],
-                    scratch.observed[begin:end],
-                    weight,
-                    tables.penalty,
-                    tables.strict,
-                    sums,
-                )
-    return certain + sums.sum() / per_goal
+    for g in range(num_goals):
+        exponentials(tables.beta, excess[g, :num_points], evidence[g, :num_points])
+    for goal in range(num_goals):
+        for k in range(per_goal):
+            p = goal * per_goal + k
+            value_in_all_stages(
+                goal,
+                p,
+                num_goals,
+                excess,
+                evidence,
+                tables.tie_tolerance,
+                -tables.penalty * scratch.observed[p],
+                tables.strict,
+                scratch.value[k * num_sets : (k + 1) * num_sets],
+                scratch.total[k * num_sets : (k + 1) * num_sets],
+            )
+        add_weighted(tables.stage_weights[first + goal, :used], scratch.value[:used], scratch.total[:used], sums)
+    return sums.sum()
 
 
 @kernel
@@ -423,11 +330,10 @@ def score_table(
                 optimal[g],
                 scratch.excess[g],
             )
+            scratch.excess[g, g * per_goal : (g + 1) * per_goal] = 0.0
         if len(boxes):
             detour_excess(boxes, count, tables, first, num_goals, num_points, optimal, scratch)
-        weigh_evidence(num_goals, num_points, per_goal, tables.beta, tables.tie_tolerance, scratch)
-        sum_subsets(num_goals, num_points, scratch)
-        legibility += group_value(q, num_goals, tables, scratch)
+        legibility += group_value(first, num_goals, num_points, tables, scratch)
     scores[0] = legibility
     scores[1] = distance
     scores[2] = mean_detour

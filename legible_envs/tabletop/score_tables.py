@@ -74,18 +74,13 @@ def make_tables(
     for transition in task.transitions():
         reaches[transition.start, transition.goal] += transition.weight
     goals = [(start, goal) for start, members, _ in groups for goal in members]
-    stages = [
-        (sum(1 << members.index(g) for g in stage.goals), stage.weight) for _, members, held in groups for stage in held
-    ]
     return ReachTables(
         targets=_ints(points.index(t) for t in targets),
         group_start=_ints(points.index(start) for start, _, _ in groups),
         group_offset=_ints(np.cumsum([0, *(len(members) for _, members, _ in groups)])),
         goal_target=_ints(targets.index(goal) for _, goal in goals),
         reach_weight=np.array([reaches[key] for key in goals]) / sum(reaches.values()),
-        stage_offset=_ints(np.cumsum([0, *(len(held) for _, _, held in groups)])),
-        stage_mask=_ints(mask for mask, _ in stages),
-        stage_weight=np.array([weight for _, weight in stages]),
+        stage_weights=_stage_weights(groups, len(fractions)),
         leg_from=_ints(points.index(a) for a, _ in legs),
         leg_target=_ints(targets.index(b) for _, b in legs),
         leg_weight=np.array(list(legs.values()), dtype=np.float64),
@@ -109,6 +104,22 @@ def _groups(stages: Sequence[Stage]) -> list[tuple[str, list[str], list[Stage]]]
         )
         groups = [g for g in groups if g not in together] + [merged]
     return [(start, sorted(goals), held) for start, goals, held in groups]
+
+
+def _stage_weights(groups: Sequence[tuple[str, list[str], list[Stage]]], num_points: int) -> npt.NDArray[np.float64]:
+    """See :class:`~legible_envs.tabletop.legibility.ReachTables`."""
+    most = max(1 << (len(members) - 1) for _, members, _ in groups) * num_points
+    rows = []
+    for _, members, held in groups:
+        for goal in members:
+            others = [other for other in members if other != goal]
+            weights = np.zeros(1 << len(others))
+            for stage in held:
+                if goal in stage.goals:
+                    weights[sum(1 << others.index(other) for other in stage.goals if other != goal)] += stage.weight
+            row = np.tile(weights / num_points, num_points)
+            rows.append(np.concatenate([row, np.zeros(most - len(row))]))
+    return np.array(rows)
 
 
 def _legs(task: TaskGraph) -> dict[tuple[str, str], float]:
