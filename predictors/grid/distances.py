@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.rollouts import Trajectory
-from predictors.base import GoalPredictor
+from predictors.base import GoalPredictor, GoalStream
 
 __all__ = ["GridPredictor", "check_complete", "check_walk", "posterior", "remaining_steps"]
 
@@ -124,12 +124,27 @@ def posterior(walk: Trajectory, prior: npt.NDArray[np.float64], goal_costs: Goal
     return weights / weights.sum()
 
 
+class GridStream(GoalStream):
+    """A belief about someone walking on a grid; each cell is checked once, by the predictor."""
+
+    def _observed(self) -> Trajectory:
+        if not self._points:
+            return self._context
+        part = self._context.first(0)
+        part.__dict__.update(states=np.array(self._points), times=np.array(self._times))
+        return part
+
+
 class GridPredictor(GoalPredictor):
     """A predictor that looks at one walk at a time; subclasses define ``candidate_probabilities``."""
 
     @abstractmethod
     def candidate_probabilities(self, walk: Trajectory) -> npt.NDArray[np.float64]:
         """``(len(walk.candidates),)`` probabilities in the order of the walk's candidates."""
+
+    def stream(self, context: Trajectory) -> GridStream:
+        """Watch one person as they move; see :meth:`GoalPredictor.stream`."""
+        return GridStream(self, context)
 
     def predict_proba(self, X: Sequence[Trajectory]) -> npt.NDArray[np.float64]:
         """See :meth:`GoalPredictor.predict_proba`."""
