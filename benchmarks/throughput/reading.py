@@ -45,13 +45,13 @@ def reading(settings: Settings) -> list[Figure]:
         MaxEntIRL().fit(walks)
         return 1
 
-    works: dict[str, Callable[[], int]] = {"gradient": gradients, "fit": fit}
+    works: dict[str, Callable[[], int]] = {"maxent gradient": gradients, "maxent fit": fit}
     works |= {key: _updater(make_predictor(name).fit(walks), walks) for key, (name, _) in _UPDATES.items()}
     samplers = {key: lambda work=work: 1 / rate(work, settings.seconds) for key, work in works.items()}  # type: ignore[misc]
     samples = alternate(samplers, settings.rounds)
     what = {
-        "gradient": "gradient of maximum-entropy IRL, 9x9, 5 goals, 200 walks",
-        "fit": "its whole fit",
+        "maxent gradient": "gradient of maximum-entropy IRL, 9x9, 5 goals, 200 walks",
+        "maxent fit": "whole fit of maximum-entropy IRL, 9x9, 5 goals, 200 walks",
         **{key: text for key, (_, text) in _UPDATES.items()},
     }
     return [Figure(key, what[key], "s", values) for key, values in samples.items()]

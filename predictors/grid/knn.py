@@ -40,17 +40,18 @@ class GridNeighbours(PrefixPredictor):
     def _learn(self, walks: Sequence[Trajectory]) -> None:
         self._encoder = PrefixEncoder(walks, self.classes_)
         features, weights = distinct_prefixes(walks, self._encoder, self.classes_)
-        self._features, self._weights = features, weights
+        self._columns_first, self._weights = np.ascontiguousarray(features.T), weights
         self._squares = (features**2).sum(axis=1)
         self._sizes = weights.sum(axis=1)
         self._fallback = self._prior.of(self.classes_.tolist())
 
     def _read(self, walk: Trajectory, cells: Steps) -> npt.NDArray[np.float64]:
         query = self._encoder.encode(walk, cells)
+        there = np.flatnonzero(query)  # a dozen features of hundreds
         # Rounded so that equally near ones stay equally near on every machine.
-        distances = np.round(self._squares - 2.0 * (self._features @ query), 9)
+        distances = np.round(self._squares - 2.0 * (query[there] @ self._columns_first[there]), 9)
         limit = self._distance_of_kth(distances)
-        return self._weights[distances <= limit].sum(axis=0) + self._fallback
+        return self._weights[np.flatnonzero(distances <= limit)].sum(axis=0) + self._fallback
 
     def _distance_of_kth(self, distances: npt.NDArray[np.float64]) -> float:
         count = len(distances)
