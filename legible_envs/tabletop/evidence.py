@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from legible_envs.compiled import kernel
 
-__all__ = ["add_weighted", "exponentials", "value_in_all_stages"]
+__all__ = ["add_weighted", "exponentials", "settle_ties", "sum_candidates"]
 
 Floats = npt.NDArray[np.float64]
 
@@ -40,57 +40,74 @@ def exponentials(beta: float, excess: Floats, evidence: Floats) -> None:
 
 
 @kernel
-def value_in_all_stages(
-    goal: int,
-    p: int,
+def keep_margin(value: Floats, evidence: Floats, result: Floats) -> None:
+    """``result = min(value, 1 - evidence)`` (a call of its own, like the next, so that it is vectorised)."""
+    for p in range(len(evidence)):
+        margin = 1.0 - evidence[p]
+        result[p] = margin if margin < value[p] else value[p]
+
+
+@kernel
+def add_rows(a: Floats, b: Floats, result: Floats) -> None:
+    """``result = a + b``."""
+    for p in range(len(b)):
+        result[p] = a[p] + b[p]
+
+
+@kernel
+def sum_candidates(num_goals: int, num_points: int, evidence: Floats, value: Floats, total: Floats) -> None:
+    """Eq. 2 as ``value / total`` of every point for every set of candidates, as if no goals tied.
+
+    Args:
+        num_goals: Goals of the group.
+        num_points: Points of all its reaches.
+        evidence: ``[G, P]`` weights in Eq. 1; 0 for the true goal of a point, which is always a candidate of weight 1.
+        value: ``[2^G * P]`` out; row ``mask`` holds the points for the candidates in ``mask``.
+        total: ``[2^G * P]`` out.
+    """
+    n = num_points
+    value[:n] = 1.0
+    total[:n] = 1.0
+    for g in range(num_goals):
+        row = evidence[g, :n]
+        for rest in range(1 << g):
+            old, new = rest * n, (rest | 1 << g) * n
+            keep_margin(value[old : old + n], row, value[new : new + n])
+            add_rows(total[old : old + n], row, total[new : new + n])
+
+
+@kernel
+def settle_ties(
     num_goals: int,
+    num_points: int,
+    per_goal: int,
     excess: Floats,
-    evidence: Floats,
     tie_tolerance: float,
-    doubt: float,
+    observed: Floats,
+    penalty: float,
     strict: bool,
     value: Floats,
     total: Floats,
 ) -> None:
-    """Eq. 2 of one observed point, as ``value / total``, for every set of goals the true one may be valid with.
-
-    Args:
-        goal: The true goal; on its own shortest path its excess is 0 and its evidence 1.
-        p: The point.
-        num_goals: Goals of the group.
-        excess: ``[G, P]`` excess cost of each goal at each point.
-        evidence: ``[G, P]`` their weights in Eq. 1.
-        tie_tolerance: Excess costs up to this tie with the true goal.
-        doubt: Eq. 2 of a wrong guess here (negative).
-        strict: Whether a tie counts as wrong rather than as a fair guess.
-        value: ``[2^(G-1)]`` out; bit ``j`` of the index stands for the ``j``-th goal but the true one.
-        total: ``[2^(G-1)]`` out.
-    """
-    value[0] = 1.0
-    total[0] = 1.0
-    width = 1
-    is_tied = False
-    for g in range(num_goals):
-        if g != goal:
-            weight = evidence[g, p]
-            margin = 1.0 - weight
-            is_tied |= excess[g, p] <= tie_tolerance
-            for others in range(width):
-                total[width + others] = total[others] + weight
-                value[width + others] = margin if margin < value[others] else value[others]
-            width *= 2
-    if not is_tied:
-        return
-    for others in range(1, width):
-        tied, j = 1.0, 0
+    """Overwrite ``value / total`` where goals tie with the true one: a guess among them costs what was observed."""
+    for p in range(num_points):
+        goal = p // per_goal
+        tied = 0
         for g in range(num_goals):
-            if g != goal:
-                if others >> j & 1 and excess[g, p] <= tie_tolerance:
-                    tied += 1.0
-                j += 1
-        if tied > 1.0:
-            value[others] = doubt if strict else doubt * (tied - 1.0)
-            total[others] = 1.0 if strict else tied
+            if g != goal and excess[g, p] <= tie_tolerance:
+                tied |= 1 << g
+        if tied == 0:
+            continue
+        for mask in range(1 << num_goals):
+            both = mask & tied
+            if both and mask >> goal & 1:
+                others = 0.0
+                while both:
+                    both &= both - 1
+                    others += 1.0
+                e = mask * num_points + p
+                value[e] = -penalty * observed[p] * (1.0 if strict else others)
+                total[e] = 1.0 if strict else others + 1.0
 
 
 @kernel

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.compiled import kernel
-from legible_envs.tabletop.evidence import add_weighted, exponentials, value_in_all_stages
+from legible_envs.tabletop.evidence import add_weighted, exponentials, settle_ties, sum_candidates
 from legible_envs.tabletop.visibility import (
     SHRINK,
     Floats,
@@ -45,8 +45,8 @@ class ReachTables(NamedTuple):
         group_offset: ``[Q + 1]`` where each group's goals begin in the arrays below.
         goal_target: ``[R]`` each goal of each group, as a position in ``targets``.
         reach_weight: ``[R]`` expected number of such reaches, divided by that of all reaches.
-        stage_weights: ``[R, S]`` for each goal and each set of other goals of its group it may be valid with: the
-            expected visits of that stage, divided by ``K`` and repeated ``K`` times (the set changes fastest).
+        stage_weights: ``[Q, 2^G * P]`` for each group, set of candidates and point: the expected visits of that stage,
+            divided by ``K``; 0 where the point's true goal is no candidate. ``P`` is the group's number of points.
         leg_from: ``[L]`` point each leg of the task leaves from.
         leg_target: ``[L]`` position in ``targets`` of the point it leads to.
         leg_weight: ``[L]`` expected number of such legs.
@@ -232,32 +232,31 @@ def detour_excess(
 
 
 @kernel
-def group_value(first: int, num_goals: int, num_points: int, tables: ReachTables, scratch: Scratch) -> float:
+def group_value(q: int, num_goals: int, tables: ReachTables, scratch: Scratch) -> float:
     """Sum over the stages of one group, and over their valid goals, of weight times E[EnvLegibility] (Eq. 2)."""
     per_goal = len(tables.fractions)
-    num_sets = 1 << (num_goals - 1)
-    used = num_sets * per_goal
-    excess, evidence = scratch.excess, scratch.evidence
-    sums = scratch.sums[:used]
-    sums[:] = 0.0
+    n = num_goals * per_goal
     for g in range(num_goals):
-        exponentials(tables.beta, excess[g, :num_points], evidence[g, :num_points])
-    for goal in range(num_goals):
-        for k in range(per_goal):
-            p = goal * per_goal + k
-            value_in_all_stages(
-                goal,
-                p,
-                num_goals,
-                excess,
-                evidence,
-                tables.tie_tolerance,
-                -tables.penalty * scratch.observed[p],
-                tables.strict,
-                scratch.value[k * num_sets : (k + 1) * num_sets],
-                scratch.total[k * num_sets : (k + 1) * num_sets],
-            )
-        add_weighted(tables.stage_weights[first + goal, :used], scratch.value[:used], scratch.total[:used], sums)
+        exponentials(tables.beta, scratch.excess[g, :n], scratch.evidence[g, :n])
+        scratch.evidence[g, g * per_goal : (g + 1) * per_goal] = 0.0
+    sum_candidates(num_goals, n, scratch.evidence, scratch.value, scratch.total)
+    settle_ties(
+        num_goals,
+        n,
+        per_goal,
+        scratch.excess,
+        tables.tie_tolerance,
+        scratch.observed,
+        tables.penalty,
+        tables.strict,
+        scratch.value,
+        scratch.total,
+    )
+    sums = scratch.sums[:n]
+    sums[:] = 0.0
+    for mask in range(1, 1 << num_goals):
+        row = slice(mask * n, (mask + 1) * n)
+        add_weighted(tables.stage_weights[q, row], scratch.value[row], scratch.total[row], sums)
     return sums.sum()
 
 
@@ -333,7 +332,7 @@ def score_table(
             scratch.excess[g, g * per_goal : (g + 1) * per_goal] = 0.0
         if len(boxes):
             detour_excess(boxes, count, tables, first, num_goals, num_points, optimal, scratch)
-        legibility += group_value(first, num_goals, num_points, tables, scratch)
+        legibility += group_value(q, num_goals, tables, scratch)
     scores[0] = legibility
     scores[1] = distance
     scores[2] = mean_detour

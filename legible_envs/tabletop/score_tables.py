@@ -108,18 +108,14 @@ def _groups(stages: Sequence[Stage]) -> list[tuple[str, list[str], list[Stage]]]
 
 def _stage_weights(groups: Sequence[tuple[str, list[str], list[Stage]]], num_points: int) -> npt.NDArray[np.float64]:
     """See :class:`~legible_envs.tabletop.legibility.ReachTables`."""
-    most = max(1 << (len(members) - 1) for _, members, _ in groups) * num_points
-    rows = []
-    for _, members, held in groups:
-        for goal in members:
-            others = [other for other in members if other != goal]
-            weights = np.zeros(1 << len(others))
-            for stage in held:
-                if goal in stage.goals:
-                    weights[sum(1 << others.index(other) for other in stage.goals if other != goal)] += stage.weight
-            row = np.tile(weights / num_points, num_points)
-            rows.append(np.concatenate([row, np.zeros(most - len(row))]))
-    return np.array(rows)
+    sizes = [(1 << len(members)) * len(members) * num_points for _, members, _ in groups]
+    weights = np.zeros((len(groups), max(sizes)))
+    for row, size, (_, members, held) in zip(weights, sizes, groups, strict=True):
+        by_mask = row[:size].reshape(-1, len(members), num_points)
+        for stage in held:
+            valid = [members.index(goal) for goal in stage.goals]
+            by_mask[sum(1 << g for g in valid), valid] += stage.weight / num_points
+    return weights
 
 
 def _legs(task: TaskGraph) -> dict[tuple[str, str], float]:
