@@ -146,22 +146,65 @@ def emitters() -> None:
 @click.option("--prefix", type=_Prefix(), help="Which prefixes of a walk count. [default: mean, or the run's own]")
 @_pots
 @click.option("--trajectories", type=click.Path(exists=True, dir_okay=False, path_type=Path),
-              help="Recorded walks: also say how well predictors read them in this kitchen.")  # fmt: skip
-def score(layout: str, prefix: Any, pots: int | None, trajectories: Path | None) -> None:
+              help="Walks (.npz, .csv, or a recorded play): also say how well predictors read them.")  # fmt: skip
+@click.option("--predictor", "predictors", multiple=True, metavar="NAME|MODULE:CLASS",
+              help="Judge this predictor by cross-validation; may be repeated.")  # fmt: skip
+@click.option("--cut", type=click.Choice(["steps", "cells", "time", "arc"]), default="steps", show_default=True,
+              help="What a fraction observed is a fraction of.")  # fmt: skip
+@click.option("--folds", type=click.IntRange(min=2), default=4, show_default=True, help="Of the cross-validation.")
+@click.option("--repeats", type=click.IntRange(min=1), default=3, show_default=True, help="Of the cross-validation.")
+@click.option("--by-participant", is_flag=True, help="Never learn from a person and judge on them.")
+@click.option("--keep-rare", is_flag=True, help="Judge goals with fewer examples than folds all the same.")
+@click.option("--curve/--no-curve", default=True, show_default=True, help="Draw a learning curve.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the splits.")
+@_out
+@click.pass_context
+def score(
+    ctx: click.Context,
+    layout: str,
+    prefix: Any,
+    pots: int | None,
+    trajectories: Path | None,
+    predictors: tuple[str, ...],
+    by_participant: bool,
+    out: Path | None,
+    **settings: Any,
+) -> None:
     """Score one kitchen exactly.
 
-    Prints legibility, distance, and what belongs beside them.
+    Prints legibility, distance, and what belongs beside them. With --predictor, judges predictors on the walks in the
+    --trajectories file, and writes tables, figures and a page into the --out folder; where LAYOUT is the folder of a
+    search, into its people folder, and a section into its report.
     """
-    from benchmarks.inspecting import read_people, score_lines
+    from benchmarks.inspecting import read_people, score_lines, walks_in
     from benchmarks.kitchens import load_kitchen
 
+    given = [
+        name
+        for name in (*settings, "by_participant", "out")
+        if ctx.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT
+    ]
+    if predictors and trajectories is None:
+        raise click.UsageError("--predictor needs --trajectories: the walks to judge it on")
+    if given and not predictors:
+        raise click.UsageError(f"--{given[0].replace('_', '-')} is about --predictor, which is not given")
     kitchen = load_kitchen(layout, prefix=prefix, pots=pots)
     for line in score_lines(kitchen):
         click.echo(line)
-    if trajectories is not None:
-        from benchmarks.console import say
+    if trajectories is None:
+        return
+    from benchmarks.console import say
 
+    if not predictors:
         read_people(say(), kitchen, trajectories)
+        return
+    from benchmarks.people import print_reading, read_walks, save_reading
+
+    walks = walks_in(kitchen, trajectories)
+    reading = read_walks(walks, predictors, groups="participant" if by_participant else None, **settings)
+    print_reading(say(), reading)
+    for line in save_reading(reading, layout, out):
+        click.echo(line)
 
 
 @main.command()

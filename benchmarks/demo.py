@@ -170,8 +170,9 @@ def recorded_play(folder: Path | None = None, *, fetch: bool = True) -> dict[str
     except (RecordingsError, OSError) as error:
         return {"note": f"Recorded play was left out: {' '.join(str(error).split())}"}
     from benchmarks.human_play.run import score_recorded_play
+    from benchmarks.human_play.sweep import UNTRAINED
 
-    return _summed_up(score_recorded_play(folder))
+    return _summed_up(score_recorded_play(folder, predictors=UNTRAINED, repeats=1))
 
 
 def _summed_up(scores: pd.DataFrame) -> dict[str, Any]:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from benchmarks.kitchens import Kitchen
     from legible_envs.rollouts import Trajectory
 
-__all__ = ["read_people", "score_lines", "show_kitchen"]
+__all__ = ["read_people", "score_lines", "show_kitchen", "walks_in"]
 
 WORST_ROWS, BEST_ROWS = 10, 3
 """Rows of the tables of losses and gains that the terminal shows."""
@@ -99,12 +99,10 @@ def read_people(console: Console, kitchen: Kitchen, trajectories: Path) -> None:
     Raises:
         ValueError: The file holds no walks, or none of this kitchen.
     """
-    from legible_envs.rollouts import load_trajectories
+    from legible_envs.rollouts import CUTS
     from predictors import BayesianGoalPredictor, ShortestDistance
 
-    walks = [walk for walk in load_trajectories(trajectories) if _same_cells(walk, kitchen)]
-    if not walks:
-        raise ValueError(f"{trajectories} has no walk recorded in this kitchen (layout id {kitchen.layout.layout_id})")
+    walks = walks_in(kitchen, trajectories)
     fractions = (0.1, 0.3, 0.5, 0.7, 0.9)
     rows = []
     for name, predictor in (("shortest distance", ShortestDistance()), ("Eq. 1", BayesianGoalPredictor())):
@@ -113,6 +111,21 @@ def read_people(console: Console, kitchen: Kitchen, trajectories: Path) -> None:
         rows.append({"predictor": name, **{f"{f:.0%}": s for f, s in zip(fractions, scores, strict=True)}})
     console.print(f"\n{len(walks):,} walks: goals read correctly, by share of the walk observed", style="bold")
     console.print(table(rows))
+    console.print(f"definition: fraction f observed means {CUTS['steps']}; ties fractional", style="dim", markup=False)
+
+
+def walks_in(kitchen: Kitchen, trajectories: Path) -> list[Trajectory]:
+    """The walks of a file that were made in this kitchen; a CSV that names no kitchen is taken to mean it.
+
+    Raises:
+        ValueError: The file holds no walks, or none of this kitchen.
+    """
+    from legible_envs.rollouts_io import read_any
+
+    walks = [walk for walk in read_any(trajectories, layout=kitchen.layout) if _same_cells(walk, kitchen)]
+    if not walks:
+        raise ValueError(f"{trajectories} has no walk recorded in this kitchen (layout id {kitchen.layout.layout_id})")
+    return walks
 
 
 def _same_cells(walk: Trajectory, kitchen: Kitchen) -> bool:

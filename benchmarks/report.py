@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from benchmarks.people import FOLDER, reading_section
 from benchmarks.runs import Run, read_run
 from legible_envs.files import write_atomically
 
@@ -64,6 +65,8 @@ def write_report(
 ) -> Path:
     """Write ``report.html`` into a run folder, from the files that :func:`optimizers.search` left there.
 
+    What ``legible score RUN --predictor NAME`` found about people is a section of it.
+
     Args:
         run_folder: The folder of a finished, interrupted or running search.
         conditions: Layouts to show side by side; None leaves the section out.
@@ -79,7 +82,7 @@ def write_report(
     """
     run = read_run(run_folder)
     path = run.folder / "report.html"
-    page = _render(report_data(run, conditions, recorded_play))
+    page = _render(report_data(run, conditions, recorded_play), reading_section(run.folder / FOLDER) or "")
     write_atomically(path, lambda stream: stream.write(page.encode()))
     return path
 
@@ -223,7 +226,7 @@ def _plain(value: Any) -> Any:
 # -- the page ----------------------------------------------------------------------------------------------------------
 
 
-def _render(data: dict[str, Any]) -> str:
+def _render(data: dict[str, Any], people: str = "") -> str:
     from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
@@ -239,6 +242,7 @@ def _render(data: dict[str, Any]) -> str:
         figures=_figures(data),
         palette=PALETTE,
         data=data,
+        people=Markup(people),
         best=data["best"],
         settings=_settings(data["config"]),
         created=_date(data["config"].get("created")),

@@ -188,7 +188,7 @@ class PrefixScore:
     Attributes:
         step: Steps observed, ``t``.
         node: Where the person is then.
-        length: Steps of the whole walk.
+        length: Steps of the whole walk; 0 where walks of all lengths are taken together.
         probability: Share of all optimal walks that are here after ``step`` steps and have this length.
         weight: Weight of this prefix in the walk's score.
         tied: Goals at the top of the posterior.

@@ -57,6 +57,8 @@ class Trajectory:
         candidate_set: Where ``candidates`` come from: valid by precedence (``"task"``), valid in the running game
             (``"game"``), or all goals of that kind in reach (``"all"``).
         complete: Whether the last state is the goal's own; False for a prefix.
+        goal_positions: Where each of ``candidates`` is, in their order and the frame of ``states``; None where the
+            layout tells or nobody knows.
 
     Raises:
         ValueError: Wrong shapes, NaN, times that run backwards, no or repeated candidates, a goal that is not one.
@@ -78,6 +80,7 @@ class Trajectory:
     layout_name: str = ""
     candidate_set: CandidateSet = "all"
     complete: bool = True
+    goal_positions: tuple[tuple[float, ...], ...] | None = None
 
     def __post_init__(self) -> None:
         states = _checked_states(self.states)
@@ -93,6 +96,9 @@ class Trajectory:
             raise ValueError(f"the goal {self.goal!r} is not among the candidates {candidates}")
         if self.candidate_set not in ("task", "game", "all"):
             raise ValueError(f"`candidate_set` must be 'task', 'game' or 'all', got {self.candidate_set!r}")
+        if self.goal_positions is not None:
+            positions = _checked_positions(self.goal_positions, len(candidates), states)
+            object.__setattr__(self, "goal_positions", positions)
 
     # -- the observed part --------------------------------------------------------------------------------------------
 
@@ -189,6 +195,18 @@ def _checked_states(states: npt.ArrayLike) -> npt.NDArray[Any]:
         raise ValueError(f"states must be integers (cells) or floats (positions), got dtype {array.dtype}")
     array.flags.writeable = False
     return array
+
+
+def _checked_positions(positions: npt.ArrayLike, count: int, states: npt.NDArray[Any]) -> tuple[tuple[float, ...], ...]:
+    try:
+        array = np.array(positions, dtype=np.float64)
+    except ValueError as error:
+        raise ValueError(f"goal positions must be numbers of one dimension: {error}") from error
+    if array.ndim != 2 or len(array) != count or not np.isfinite(array).all():
+        raise ValueError(f"expected one finite position for each of {count} candidates, got {positions!r}")
+    if len(states) and array.shape[1] != states.shape[1]:
+        raise ValueError(f"goal positions have dimension {array.shape[1]}, the states {states.shape[1]}")
+    return tuple(tuple(row) for row in array.tolist())
 
 
 def _checked_times(times: npt.ArrayLike | None, count: int) -> npt.NDArray[np.float64]:

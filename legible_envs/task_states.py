@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
 
+import numpy as np
+
 from legible_envs.errors import TaskError
 
 __all__ = ["StateSpace", "SubtaskClass"]
@@ -127,6 +129,18 @@ class StateSpace:
                     for i in self.ready(done)
                 )
         return completions
+
+    def sample(self, rng: np.random.Generator) -> list[tuple[str, tuple[str, ...], str, tuple[str, ...]]]:
+        """``(place, valid goals, goal, places afterwards)`` of every step of a uniformly random valid sequence."""
+        completions, state, sequence = self.completions, self.initial, []
+        for _ in range(self.length):
+            steps = [step for step in self.steps(state) if completions[step[3]]]
+            odds = [copies * (completions[following] / completions[state]) for _, _, copies, following in steps]
+            i, goal, _, following = steps[rng.choice(len(steps), p=np.array(odds) / sum(odds))]
+            goals = tuple(sorted({step[1] for step in steps}))
+            sequence.append((state[1], goals, goal, self.classes[i].then))
+            state = following
+        return sequence
 
     def transition_weights(self) -> dict[tuple[str, tuple[str, ...], str, tuple[str, ...]], float]:
         """Expected number of each ``(place, valid goals, goal, places afterwards)`` in a random valid sequence."""

@@ -22,6 +22,7 @@ from legible_envs.task_states import StateSpace, SubtaskClass
 
 if TYPE_CHECKING:
     import networkx as nx
+    import numpy as np
 
 __all__ = ["Stage", "Subtask", "TaskGraph", "Transition"]
 
@@ -255,6 +256,10 @@ class TaskGraph:
     @cached_property
     def _transitions(self) -> tuple[Transition, ...]:
         return tuple(Transition(*key, weight) for key, weight in sorted(self._space.transition_weights().items()))
+
+    def sample(self, rng: np.random.Generator) -> tuple[Transition, ...]:
+        """One uniformly random valid sequence, as the transitions it makes; each weighs 1."""
+        return tuple(Transition(*step, 1.0) for step in self._space.sample(rng))
 
     def legs(self) -> dict[tuple[str, str], float]:
         """Expected number of walks from each place to each other place in a uniformly random valid sequence."""

@@ -8,7 +8,8 @@
 ``offsets``    ``(n+1,)`` trajectory ``i`` is rows ``offsets[i]:offsets[i+1]``
 ``records``    JSON as ASCII bytes (uint8): ``layouts`` (``kind`` and ``text`` each) and, per trajectory,
                ``trajectories`` (``start goal candidates participant condition layout layout_name candidate_set
-               complete``, ``layout`` being a number in ``layouts`` or null)
+               complete``, ``layout`` being a number in ``layouts`` or null; since schema 2 also
+               ``goal_positions``, where they are known)
 =============  ========================================================================================================
 """
 
@@ -29,7 +30,7 @@ from legible_envs.rollouts import Trajectory
 
 __all__ = ["SCHEMA", "read", "write"]
 
-SCHEMA: Final = 1
+SCHEMA: Final = 2
 _KIND: Final = "legible-envs trajectories"
 _TEXTS: Final = ("start", "goal", "candidates", "participant", "condition", "layout_name", "candidate_set", "complete")
 _LAYOUT_READERS: Final = {"overcooked": OvercookedLayout.from_ascii}
@@ -49,6 +50,8 @@ def write(path: str | os.PathLike[str], trajectories: Iterable[Trajectory]) -> P
     for walk in walks:
         record = {name: getattr(walk, name) for name in _TEXTS}
         record["layout"] = None if walk.layout is None else layouts.setdefault(walk.layout, len(layouts))
+        if walk.goal_positions is not None:
+            record["goal_positions"] = walk.goal_positions
         records.append(record)
     content = {
         "layouts": [{"kind": "overcooked", "text": layout.to_ascii()} for layout in layouts],
@@ -59,7 +62,8 @@ def write(path: str | os.PathLike[str], trajectories: Iterable[Trajectory]) -> P
         path,
         {
             "kind": _KIND,
-            "schema": SCHEMA,
+            # Files that use nothing new stay readable by older versions.
+            "schema": SCHEMA if any("goal_positions" in record for record in records) else 1,
             "states": np.concatenate(states),
             "times": np.concatenate([np.zeros(0), *(walk.times for walk in walks)]),
             "offsets": np.cumsum([0, *(walk.num_states for walk in walks)], dtype=np.int64),

@@ -13,13 +13,34 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from predictors.base import GoalPredictor
     from predictors.grid.bayesian import BayesianGoalPredictor
+    from predictors.grid.knn import GridNeighbours
+    from predictors.grid.logistic import GridLogistic
+    from predictors.grid.maxent_irl import MaxEntIRL
+    from predictors.grid.ngram import GridNGram
     from predictors.grid.shortest_distance import ShortestDistance
+    from predictors.neural.recurrent import RecurrentPredictor
+    from predictors.neural.transformer import TransformerPredictor
+    from predictors.reaching.baselines import ReachLogistic, ReachNeighbours
+    from predictors.reaching.bayesian import StraightLineBayesian
+    from predictors.reaching.gaussian import TimeSeriesGaussian
     from predictors.registry import check_predictor, list_predictors, make_predictor, register_predictor
+    from predictors.streaming import ThresholdDecision
 
 __all__ = [
     "BayesianGoalPredictor",
     "GoalPredictor",
+    "GridLogistic",
+    "GridNGram",
+    "GridNeighbours",
+    "MaxEntIRL",
+    "ReachLogistic",
+    "ReachNeighbours",
+    "RecurrentPredictor",
     "ShortestDistance",
+    "StraightLineBayesian",
+    "ThresholdDecision",
+    "TimeSeriesGaussian",
+    "TransformerPredictor",
     "check_predictor",
     "list_predictors",
     "make_predictor",
@@ -30,7 +51,18 @@ __all__ = [
 _HOME = {
     "BayesianGoalPredictor": "predictors.grid.bayesian",
     "GoalPredictor": "predictors.base",
+    "GridLogistic": "predictors.grid.logistic",
+    "GridNGram": "predictors.grid.ngram",
+    "GridNeighbours": "predictors.grid.knn",
+    "MaxEntIRL": "predictors.grid.maxent_irl",
+    "ReachLogistic": "predictors.reaching.baselines",
+    "ReachNeighbours": "predictors.reaching.baselines",
+    "RecurrentPredictor": "predictors.neural.recurrent",
     "ShortestDistance": "predictors.grid.shortest_distance",
+    "StraightLineBayesian": "predictors.reaching.bayesian",
+    "ThresholdDecision": "predictors.streaming",
+    "TimeSeriesGaussian": "predictors.reaching.gaussian",
+    "TransformerPredictor": "predictors.neural.transformer",
     "check_predictor": "predictors.registry",
     "list_predictors": "predictors.registry",
     "make_predictor": "predictors.registry",

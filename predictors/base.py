@@ -10,6 +10,7 @@ define ``predict_proba``; define ``fit`` if something is learned (call ``super()
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import Any, Final, Literal, Self
@@ -216,6 +217,16 @@ class GoalStream:
         self._times: list[float] = []
 
     @property
+    def num_states(self) -> int:
+        """How many states have been seen; standing still on a cell of a grid is none."""
+        return len(self._points)
+
+    @property
+    def last_time(self) -> float:
+        """Time of the last state; NaN before the first."""
+        return self._times[-1] if self._times else math.nan
+
+    @property
     def belief(self) -> dict[str, float]:
         """``{goal: probability}`` now; the prior before the first point."""
         row = self._predictor.predict_proba([self._observed()])[0]
@@ -265,4 +276,5 @@ class GoalStream:
             layout_name=part.layout_name,
             candidate_set=part.candidate_set,
             complete=False,
+            goal_positions=part.goal_positions,
         )

@@ -137,6 +137,7 @@ def _with_goal(walk: Trajectory, goal: str | None) -> Trajectory:
         layout_name=walk.layout_name,
         candidate_set=walk.candidate_set,
         complete=walk.complete,
+        goal_positions=walk.goal_positions,
     )
 
 

@@ -38,7 +38,17 @@ _registry = Registry(
     ENTRY_POINT_GROUP,
     {
         "bayesian": "predictors.grid.bayesian:BayesianGoalPredictor",
+        "grid-knn": "predictors.grid.knn:GridNeighbours",
+        "grid-logistic": "predictors.grid.logistic:GridLogistic",
+        "grid-ngram": "predictors.grid.ngram:GridNGram",
+        "maxent-irl": "predictors.grid.maxent_irl:MaxEntIRL",
+        "reach-bayesian": "predictors.reaching.bayesian:StraightLineBayesian",
+        "reach-gaussian": "predictors.reaching.gaussian:TimeSeriesGaussian",
+        "reach-knn": "predictors.reaching.baselines:ReachNeighbours",
+        "reach-logistic": "predictors.reaching.baselines:ReachLogistic",
+        "recurrent": "predictors.neural.recurrent:RecurrentPredictor",
         "shortest-distance": "predictors.grid.shortest_distance:ShortestDistance",
+        "transformer": "predictors.neural.transformer:TransformerPredictor",
     },
     PredictorError,
 )

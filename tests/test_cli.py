@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -263,6 +264,116 @@ def test_score_reads_recorded_walks_of_the_kitchen(tmp_path: Path) -> None:
     expected = BayesianGoalPredictor().fit([walk]).score([walk], fractions=(0.5,))
     row = next(line for line in result.output.splitlines() if line.strip().startswith("Eq. 1")).split()
     assert float(row[4]) == pytest.approx(expected, abs=1e-3)
+
+
+@pytest.fixture
+def walks_of_run(run: Path, tmp_path: Path) -> Path:
+    """Walks of eight people in the best kitchen of a run, in two conditions, as CSV."""
+    import gymnasium as gym
+    import numpy as np
+
+    from legible_envs.overcooked import OvercookedLayout
+    from legible_envs.overcooked.policies import ScriptedPlayer
+    from legible_envs.overcooked.walks import record_episode
+    from legible_envs.rollouts_io import write_csv
+
+    layout = OvercookedLayout.from_ascii((run / "best.txt").read_text())
+    env = gym.make("LegibleOvercooked-v0", shape=layout.shape, layout=layout)
+    walks = []
+    for person in range(8):
+        player = ScriptedPlayer(env, np.random.default_rng(person))
+        labels = {"participant": f"p{person}", "condition": "ab"[person % 2], "candidate_set": "all"}
+        walks += record_episode(env, player, seed=person, **labels)
+    return write_csv(tmp_path / "walks.csv", walks)
+
+
+def test_score_judges_predictors_and_reports_them(run: Path, walks_of_run: Path) -> None:
+    import json
+
+    import pandas as pd
+
+    from legible_envs.rollouts import CUTS
+    from legible_envs.rollouts_io import read_csv
+    from predictors.evaluation import compare_conditions, evaluate
+
+    options = ("--cut", "cells", "--folds", 2, "--repeats", 1, "--by-participant", "--seed", 3)
+    named = ("--predictor", "bayesian", "--predictor", "shortest-distance")
+    before = (run / "report.html").read_bytes()
+    result = legible("score", run, "--trajectories", walks_of_run, *named, *options)
+    assert result.exit_code == 0, result.output
+    assert CUTS["cells"].split(" of ")[0] in " ".join(result.output.split())
+    walks = read_csv(walks_of_run)
+    expected = evaluate(
+        ["bayesian", "shortest-distance"], walks, cut="cells", cv=2, repeats=1, groups="participant", seed=3
+    )
+    folder = run / "people"
+    found = pd.read_csv(folder / "predictions.csv")
+    assert found["correct"].tolist() == pytest.approx(expected.table["correct"].tolist())
+    about = json.loads((folder / "reading.json").read_text())
+    assert about["definition"] == expected.definition
+    assert about["summary"][0]["f1"] == pytest.approx(expected.summary()["f1"][0])
+    tested = pd.read_csv(folder / "comparison_anova.csv")
+    assert set(tested["compared"]) == {"predictor", "condition (bayesian)", "condition (shortest-distance)"}
+    row = tested.query("compared == 'predictor' and at == 'mean'").iloc[0]
+    assert row["F"] == pytest.approx(compare_conditions(expected, factor="predictor", at="mean").anova["F"][0])
+    figures = {path.name for path in folder.glob("*.svg")}
+    assert figures == {"accuracy.svg", "confusion.svg", "learning_curve.svg"}
+    page, report = (folder / "report.html").read_text(), (run / "report.html").read_text()
+    for text in (page, report):
+        assert text.count("data:image/svg+xml;base64,") == 3
+        assert "People, read by predictors" in text
+        assert "http://" not in text.replace("http://www.w3.org", "")
+    assert legible("report", run).exit_code == 0
+    assert (run / "report.html").read_text() == report
+    shutil.rmtree(folder)
+    legible("report", run)
+    assert (run / "report.html").read_bytes() == before
+
+
+def test_files_of_a_reading_cannot_run_anything(run: Path, walks_of_run: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    few = ("--folds", 2, "--repeats", 1, "--no-curve")
+    result = legible(
+        "score", run / "best.txt", "--trajectories", walks_of_run, "--predictor", "bayesian", *few, "--out", out
+    )
+    assert result.exit_code == 0, result.output
+    assert not (out / "learning_curve.svg").exists()
+    from benchmarks.people import reading_section
+
+    (out / "accuracy.svg").write_text("<svg><script>alert(1)</script></svg>")
+    text = (out / "reading.json").read_text().replace('"notes": []', '"notes": ["<script>alert(1)</script>"]')
+    (out / "reading.json").write_text(text)
+    section = reading_section(out)
+    assert section is not None
+    assert "&lt;script&gt;" in section
+    assert "<script" not in section
+    (out / "reading.json").write_text("{")
+    assert reading_section(out) is None
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--predictor", "bayesian"), "--predictor needs --trajectories"),
+        (("--folds", 3), "--folds is about --predictor"),
+        (("--out", "x"), "--out is about --predictor"),
+    ],
+)
+def test_options_of_predictors_need_them(arguments: tuple[str, ...], message: str) -> None:
+    result = legible("score", "-", *arguments, text=KITCHEN)
+    assert result.exit_code == 2
+    assert message in result.output
+
+
+def test_unknown_predictors_and_too_few_walks_are_said_in_a_line(walks_of_run: Path, run: Path) -> None:
+    for arguments, message in (
+        (("--predictor", "nobody"), "nobody"),
+        (("--predictor", "bayesian", "--folds", 1000), "1000 folds need at least"),
+    ):
+        result = legible("score", run, "--trajectories", walks_of_run, *arguments)
+        assert result.exit_code == 2, result.output
+        assert message in result.output
+        assert "Traceback" not in result.output
 
 
 def test_trajectories_of_another_kitchen_are_refused(tmp_path: Path) -> None:

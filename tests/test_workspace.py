@@ -270,7 +270,7 @@ def test_bad_genomes():
         ({"c": -1}, ValueError, "c must be"),
         ({"beta": float("nan")}, ValueError, "beta must be"),
         ({"ties": "first"}, ValueError, "ties must be"),
-        ({"human": "boltzmann"}, ValueError, "human must be"),
+        ({"human": "drunk"}, ValueError, "human must be"),
         ({"pots": 0}, TaskError, "max_open"),
         ({"stations": ("onion", "onion")}, LayoutError, "different"),
         ({"stations": ("onion", "fork")}, LayoutError, "fork|different"),

@@ -6,13 +6,19 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from benchmarks.human_play.analysis import accuracy_table
+    from benchmarks.human_play.analysis import accuracy_table, compare_with_reference
     from benchmarks.human_play.run import score_recorded_play
-    from benchmarks.human_play.sweep import PREDICTORS
+    from benchmarks.human_play.sweep import PREDICTORS, UNTRAINED
 
-__all__ = ["PREDICTORS", "accuracy_table", "score_recorded_play"]
+__all__ = ["PREDICTORS", "UNTRAINED", "accuracy_table", "compare_with_reference", "score_recorded_play"]
 
-_HOME = {"PREDICTORS": "sweep", "accuracy_table": "analysis", "score_recorded_play": "run"}
+_HOME = {
+    "PREDICTORS": "sweep",
+    "UNTRAINED": "sweep",
+    "accuracy_table": "analysis",
+    "compare_with_reference": "analysis",
+    "score_recorded_play": "run",
+}
 
 
 def __getattr__(name: str) -> object:

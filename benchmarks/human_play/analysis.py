@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from benchmarks.human_play.sweep import LAYOUTS, REFERENCE
+
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["accuracy_table", "summarise"]
+__all__ = ["accuracy_table", "compare_with_reference", "summarise"]
 
 
 def summarise(rows: pd.DataFrame) -> pd.DataFrame:
@@ -44,5 +46,27 @@ def accuracy_table(scores: pd.DataFrame) -> pd.DataFrame:
         walks=("walks", "first"), mean=("accuracy", "mean"), chance=("chance", "first")
     )
     table = means[["walks"]].join(wide).join(means[["mean", "chance"]]).reset_index()
+    table.attrs.update(scores.attrs)
+    return table
+
+
+def compare_with_reference(scores: pd.DataFrame) -> pd.DataFrame:
+    """Mean accuracy beside that measured before with other implementations of the same ideas.
+
+    Args:
+        scores: The rows of :func:`benchmarks.human_play.run.score_recorded_play`.
+
+    Returns:
+        Columns ``layout``, ``predictor``, ``accuracy``, ``reference`` and ``difference`` (NaN where none was measured).
+    """
+    table = scores.groupby(["layout", "predictor"], sort=False)["accuracy"].mean().reset_index()
+    known = {
+        (layout, predictor): value
+        for predictor, values in REFERENCE.items()
+        for layout, value in zip(LAYOUTS, values, strict=True)
+    }
+    pairs = zip(table["layout"], table["predictor"], strict=True)
+    table["reference"] = [known.get(pair, float("nan")) for pair in pairs]
+    table["difference"] = table["accuracy"] - table["reference"]
     table.attrs.update(scores.attrs)
     return table

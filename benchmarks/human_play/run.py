@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal
 
 from benchmarks.human_play.analysis import summarise
-from benchmarks.human_play.sweep import CUT, FRACTIONS_OBSERVED, LAYOUTS, PREDICTORS, Setting
+from benchmarks.human_play.sweep import CUT, FOLDS, FRACTIONS_OBSERVED, LAYOUTS, PREDICTORS, REPEATS, Setting
 from legible_envs.overcooked.recordings import recorded_trajectories
 from legible_envs.rollouts import CUTS, Cut
-from predictors.evaluation import accuracy_at
+from predictors.evaluation import evaluate
 from predictors.registry import make_predictor
 
 if TYPE_CHECKING:
@@ -27,10 +27,14 @@ def score_every_walk(
     fractions: Sequence[float] = FRACTIONS_OBSERVED,
     cut: Cut = CUT,
     candidate_set: Literal["game", "all"] = "all",
+    folds: int = FOLDS,
+    repeats: int = REPEATS,
+    seed: int = 0,
 ) -> pd.DataFrame:
-    """One row per predictor, recorded walk and fraction observed.
+    """One row per predictor, repeat, recorded walk and fraction observed.
 
-    Neither predictor of the sweep learns anything from walks but the goals' names, so nothing is held out.
+    Every walk is judged by predictors that have learned from other walks in the same kitchen (stratified
+    cross-validation; all predictors see the same splits).
 
     Args:
         folder: Where ``legible humans fetch`` wrote the recordings.
@@ -40,9 +44,13 @@ def score_every_walk(
         cut: Fraction of what; see :data:`legible_envs.rollouts.CUTS`.
         candidate_set: Which goals count as possible; see
             :func:`legible_envs.overcooked.recordings.recorded_trajectories`.
+        folds: How many parts the walks are split into.
+        repeats: How often, with other splits.
+        seed: Of the splits.
 
     Returns:
-        The columns of :func:`predictors.evaluation.accuracy_at` after a column ``predictor``; its ``attrs`` too.
+        The rows of :func:`predictors.evaluation.evaluate`: ``predictor``, ``repeat``, ``fold`` and the columns of
+        :func:`predictors.evaluation.accuracy_at`; the ``attrs`` of the latter too.
 
     Raises:
         RecordingsError: The recordings are not there; the message says how to get them.
@@ -50,15 +58,14 @@ def score_every_walk(
     import pandas as pd
 
     parts = []
+    made = {setting.label: make_predictor(setting.predictor, **setting.parameters) for setting in predictors}
     for layout in layouts:
         walks = recorded_trajectories(folder, [layout], candidate_set)
-        if not walks:
-            continue
-        for setting in predictors:
-            predictor = make_predictor(setting.predictor, **setting.parameters).fit(walks)
-            part = accuracy_at(predictor, walks, fractions, cut=cut)
-            part.insert(0, "predictor", setting.label)
-            parts.append(part)
+        if walks:
+            found = evaluate(
+                made, walks, cv=folds, repeats=repeats, fractions=fractions, cut=cut, rare="keep", seed=seed
+            )
+            parts.append(found.table)
     if not parts:
         raise ValueError(f"no walks to score in {list(layouts)} with candidate set {candidate_set!r}")
     rows = pd.concat(parts, ignore_index=True)
@@ -74,6 +81,9 @@ def score_recorded_play(
     fractions: Sequence[float] = FRACTIONS_OBSERVED,
     cut: Cut = CUT,
     candidate_set: Literal["game", "all"] = "all",
+    folds: int = FOLDS,
+    repeats: int = REPEATS,
+    seed: int = 0,
 ) -> pd.DataFrame:
     """Accuracy of each predictor in each recorded kitchen against fraction observed; see :func:`score_every_walk`.
 
@@ -83,6 +93,14 @@ def score_recorded_play(
         ``definition`` (of fraction observed, in words), ``ties`` and ``candidate_set``.
     """
     rows = score_every_walk(
-        folder, predictors=predictors, layouts=layouts, fractions=fractions, cut=cut, candidate_set=candidate_set
+        folder,
+        predictors=predictors,
+        layouts=layouts,
+        fractions=fractions,
+        cut=cut,
+        candidate_set=candidate_set,
+        folds=folds,
+        repeats=repeats,
+        seed=seed,
     )
     return summarise(rows)

@@ -15,6 +15,8 @@ import numpy as np
 from benchmarks.throughput.analysis import machine, result_table, to_markdown
 from benchmarks.throughput.measure import Figure, alternate, rate
 from benchmarks.throughput.peers import Peer, PeerError, open_peer
+from benchmarks.throughput.reaching import reaches
+from benchmarks.throughput.reading import reading
 from benchmarks.throughput.sweep import FULL, OPTIMUM_5X5, QUICK, Settings
 
 if TYPE_CHECKING:
@@ -50,6 +52,8 @@ def run_benchmark(
             ("scoring layouts", lambda: scoring(settings)),
             ("searching", lambda: searching(settings)),
             ("playing", lambda: games(settings, peer)),
+            ("reading reaches", lambda: reaches(settings)),
+            ("reading people", lambda: reading(settings)),
             ("starting", lambda: starting(settings)),
         )
         for name, measure in groups:

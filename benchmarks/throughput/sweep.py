@@ -68,6 +68,13 @@ TARGETS: Final[dict[str, Target]] = {
     "reset": Target("<=", 100e-6),
     "env / peer": Target(">=", 10),
     "vector env / peer": Target(">=", 150),
+    "dtw": Target("<=", 50e-6),
+    "gaussian update": Target("<=", 1e-3),
+    "gaussian velocity update": Target("<=", 1e-3),
+    "maxent gradient": Target("<=", 0.3e-3),
+    "maxent fit": Target("<=", 0.5),
+    "update Eq. 1": Target("<=", 100e-6),
+    "update MaxEnt": Target("<=", 100e-6),
     "import": Target("<=", 0.3),
     "compile": Target("<=", 20.0),
 }

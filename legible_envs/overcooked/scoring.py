@@ -10,14 +10,21 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from legible_envs.errors import LayoutError
 from legible_envs.legibility import From, Node, PrefixScore, PrefixSpec, Ties, check_prefix, goal_legibility
-from legible_envs.overcooked.layout import OvercookedLayout
+from legible_envs.overcooked.boltzmann import (
+    BoltzmannWalks,
+    HumanModel,
+    boltzmann_legibility,
+    boltzmann_walks,
+    check_human,
+)
+from legible_envs.overcooked.layout import FLOOR, OvercookedLayout
 from legible_envs.overcooked.recipes import soup_task
 from legible_envs.tasks import TaskGraph
 
@@ -50,24 +57,51 @@ def grid_graph(
     return graph
 
 
-_Reach = tuple[str, tuple[str, ...], str, float, list[PrefixScore]]
+class _Reach(NamedTuple):
+    """One reach of the task: where from, among which goals, for which one, how often, and what may be seen of it."""
+
+    start: str
+    goals: tuple[str, ...]
+    goal: str
+    weight: float
+    scores: list[PrefixScore]
+    lost_mass: float = 0.0
 
 
 def _reaches(
-    layout: OvercookedLayout, task: TaskGraph, cell_costs: npt.NDArray[np.float64] | None, settings: Mapping[str, Any]
+    layout: OvercookedLayout,
+    task: TaskGraph,
+    cell_costs: npt.NDArray[np.float64] | None,
+    human: HumanModel,
+    settings: Mapping[str, Any],
 ) -> Iterator[_Reach]:
-    """``(start, valid goals, true goal, expected number, prefix scores)`` of every reach of the task."""
     graph = grid_graph(layout, cell_costs)
+    walks: dict[tuple[str, str], BoltzmannWalks] = {}
+    observer = {key: value for key, value in settings.items() if key != "prefix"}
     for stage in task.stages():
         starts = _instances(layout, stage.start)
         goals = tuple(name for kind in stage.goals for name in _instances(layout, kind))
         for start in starts:
             for goal in goals:
+                lost_mass = 0.0
                 try:
-                    scores = goal_legibility(graph, From(start), goal, goals, **settings)
+                    if human.rationality is None or human.horizon is None:
+                        scores = goal_legibility(graph, From(start), goal, goals, **settings)
+                    else:
+                        if (start, goal) not in walks:
+                            walks[start, goal] = boltzmann_walks(
+                                graph,
+                                From(start),
+                                goal,
+                                rationality=human.rationality,
+                                horizon=human.horizon,
+                                prefix=settings["prefix"],
+                            )
+                        lost_mass = walks[start, goal].lost_mass
+                        scores = boltzmann_legibility(graph, From(start), goals, walks[start, goal], **observer)
                 except ValueError as error:
                     raise LayoutError(f"the task cannot be done in this kitchen: {error}", rule="reachable") from error
-                yield start, goals, goal, stage.weight / len(starts), scores
+                yield _Reach(start, goals, goal, stage.weight / len(starts), scores, lost_mass)
 
 
 def _instances(layout: OvercookedLayout, kind: str) -> tuple[str, ...]:
@@ -79,6 +113,10 @@ def _instances(layout: OvercookedLayout, kind: str) -> tuple[str, ...]:
 
 def _settings(prefix: Any, beta: float, c: float, ties: Ties, tie_tolerance: float) -> dict[str, Any]:
     return {"prefix": check_prefix(prefix), "beta": beta, "c": c, "ties": ties, "tie_tolerance": tie_tolerance}
+
+
+def _people(layout: OvercookedLayout, human: str, rationality: float | None, horizon: int | None) -> HumanModel:
+    return check_human(human, rationality, horizon, int(np.count_nonzero(layout.cells == FLOOR)))
 
 
 def layout_distance(layout: OvercookedLayout, task: TaskGraph) -> float:
@@ -117,6 +155,9 @@ def score_layout(
     ties: Ties = "expected",
     tie_tolerance: float = 1e-9,
     cell_costs: npt.NDArray[np.float64] | None = None,
+    human: str = "shortest",
+    rationality: float | None = None,
+    horizon: int | None = None,
 ) -> dict[str, Any]:
     """Score any kitchen.
 
@@ -129,27 +170,34 @@ def score_layout(
         ties: ``"expected"`` or ``"strict"``.
         tie_tolerance: Costs this close count as equal.
         cell_costs: ``(H, W)`` cost of stepping on each cell, None for 1.
+        human: How people walk, ``"shortest"`` or ``"boltzmann"``; see :mod:`legible_envs.overcooked.boltzmann`.
+        rationality: Of ``human="boltzmann"``.
+        horizon: Of ``human="boltzmann"``.
 
     Returns:
         ``score`` (Eq. 3 per sequence); ``distance`` (floor moves per execution); ``normalised``, the score over the
         expected number of (stage, goal) pairs, at most 1 for ``prefix="mean"``; ``single_goal_share``, the part of the
         score that comes from stages with one valid goal, and ``single_goal_score``; ``num_obstacles``;
-        ``candidate_set`` (``"task"``: valid by precedence); ``num_sequences``; ``num_stages``.
+        ``candidate_set`` (``"task"``: valid by precedence); ``num_sequences``; ``num_stages``; ``human``. Where
+        that is ``"boltzmann"`` also ``rationality``, ``horizon``, ``lost_mass`` (probability that a reach of the task
+        does not arrive within the horizon; the score is that of those that do) and ``largest_lost_mass`` of a reach.
 
     Raises:
         LayoutError: A station the task needs is missing or cannot be reached.
     """
     task = task or soup_task()
     settings = _settings(prefix, beta, c, ties, tie_tolerance)
-    parts, single, pairs = [], [], []
-    for _, goals, _, weight, scores in _reaches(layout, task, cell_costs, settings):
-        value = weight * math.fsum(s.probability * s.weight * s.value for s in scores)
+    people = _people(layout, human, rationality, horizon)
+    parts, single, pairs, lost = [], [], [], []
+    for reach in _reaches(layout, task, cell_costs, people, settings):
+        value = reach.weight * math.fsum(s.probability * s.weight * s.value for s in reach.scores)
         parts.append(value)
-        pairs.append(weight)
-        if len(goals) == 1:
+        pairs.append(reach.weight)
+        lost.append(reach.lost_mass)
+        if len(reach.goals) == 1:
             single.append(value)
     score = math.fsum(parts)
-    return {
+    result = {
         "score": score,
         "distance": layout_distance(layout, task),
         "normalised": score / math.fsum(pairs),
@@ -160,7 +208,13 @@ def score_layout(
         "num_sequences": task.num_sequences,
         "num_stages": len(task.stages()),
         "layout_id": layout.layout_id,
+        "human": people.name,
     }
+    if people.name == "boltzmann":
+        result["rationality"], result["horizon"] = people.rationality, people.horizon
+        result["lost_mass"] = math.fsum(w * x for w, x in zip(pairs, lost, strict=True)) / math.fsum(pairs)
+        result["largest_lost_mass"] = max(lost)
+    return result
 
 
 def explain_layout(
@@ -173,6 +227,9 @@ def explain_layout(
     ties: Ties = "expected",
     tie_tolerance: float = 1e-9,
     cell_costs: npt.NDArray[np.float64] | None = None,
+    human: str = "shortest",
+    rationality: float | None = None,
+    horizon: int | None = None,
 ) -> list[dict[str, Any]]:
     """Which stages, goals and prefixes win or lose the score; arguments as for :func:`score_layout`.
 
@@ -180,12 +237,14 @@ def explain_layout(
         A row for every stage and goal, the greatest loss first: ``start``, ``goals`` (valid), ``goal`` (true),
         ``weight`` (expected number of such stages), ``score`` (expected legibility of the reach), ``contribution``
         (weight times score; contributions sum to the layout's score), ``ties_with`` (probability that each other goal
-        is at the top together with the true one, averaged over the weighted prefixes), and ``prefixes``: a row for
-        every step ``t`` with the mean ``value`` of Eq. 2, its ``weight`` and ``ties_with`` at that step.
+        is at the top, averaged over the weighted prefixes: together with the true one, or instead of it where people
+        leave the shortest ways), and ``prefixes``: a row for every step ``t`` with the mean ``value`` of Eq. 2, its
+        ``weight`` and ``ties_with`` at that step.
     """
     rows = []
     settings = _settings(prefix, beta, c, ties, tie_tolerance)
-    for start, goals, goal, weight, scores in _reaches(layout, task or soup_task(), cell_costs, settings):
+    people = _people(layout, human, rationality, horizon)
+    for start, goals, goal, weight, scores, _ in _reaches(layout, task or soup_task(), cell_costs, people, settings):
         score = math.fsum(s.probability * s.weight * s.value for s in scores)
         rows.append(
             {
@@ -238,6 +297,9 @@ def ambiguity(
     ties: Ties = "expected",
     tie_tolerance: float = 1e-9,
     cell_costs: npt.NDArray[np.float64] | None = None,
+    human: str = "shortest",
+    rationality: float | None = None,
+    horizon: int | None = None,
 ) -> npt.NDArray[np.float64]:
     """``(H, W)`` probability that an observer who sees the person on a cell would name a wrong goal; NaN off all walks.
 
@@ -247,9 +309,9 @@ def ambiguity(
     wrong = np.zeros(layout.shape)
     visits = np.zeros(layout.shape)
     settings = _settings(prefix, beta, c, ties, tie_tolerance)
-    for _, goals, goal, weight, scores in _reaches(layout, task or soup_task(), cell_costs, settings):
+    people = _people(layout, human, rationality, horizon)
+    for _, goals, goal, weight, scores, _ in _reaches(layout, task or soup_task(), cell_costs, people, settings):
         for s in scores:
-            # A walk on an optimal path always has its goal among the tied ones.
             cell = cast("tuple[int, int]", s.node)
             visits[cell] += weight / len(goals) * s.probability
             wrong[cell] += weight / len(goals) * s.probability * (1 - (goal in s.tied) / len(s.tied))

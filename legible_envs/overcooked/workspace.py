@@ -15,6 +15,8 @@ from legible_envs.errors import LayoutError
 from legible_envs.legibility import PrefixSpec, Ties, check_prefix
 from legible_envs.overcooked import genomes as kernels
 from legible_envs.overcooked import scoring
+from legible_envs.overcooked.arguments import check_costs, check_finite
+from legible_envs.overcooked.boltzmann import check_human
 from legible_envs.overcooked.design_rules import DesignRules
 from legible_envs.overcooked.layout import INGREDIENTS, STATION_TYPES, Cell, OvercookedLayout
 from legible_envs.overcooked.recipes import PAPER_SOUPS, check_recipes, soup_task
@@ -46,7 +48,11 @@ class OvercookedWorkspace(Workspace):
         beta: Rationality per unit of path cost (Eq. 1).
         ties: ``"expected"`` (uniform tie-breaking) or ``"strict"`` (a tie counts as wrong).
         tie_tolerance: Path costs this close count as equal.
-        human: How people walk: ``"shortest"``, uniformly over all shortest paths.
+        human: How people walk: ``"shortest"``, uniformly over all shortest paths, or ``"boltzmann"``, noisily rational
+            (:mod:`legible_envs.overcooked.boltzmann`). Distances are those of shortest paths in either case.
+        rationality: Of ``human="boltzmann"``, per unit of path cost; 1.3 if None, as recorded people.
+        horizon: Of ``human="boltzmann"``: steps after which a walk is given up; scores are those of walks that arrive.
+            Twice the longest conceivable shortest walk if None.
         recipes: Soups of the default task.
         pots: How many soups may be in progress at once; None means precedence only, as in the paper's appendix.
         task: A :class:`~legible_envs.tasks.TaskGraph` over station types (or its ``to_dict()``), in place of
@@ -86,6 +92,8 @@ class OvercookedWorkspace(Workspace):
         ties: Ties = "expected",
         tie_tolerance: float = 1e-9,
         human: str = "shortest",
+        rationality: float | None = None,
+        horizon: int | None = None,
         recipes: Sequence[Sequence[str]] = PAPER_SOUPS,
         pots: int | None = None,
         task: TaskGraph | Mapping[str, Any] | None = None,
@@ -99,12 +107,11 @@ class OvercookedWorkspace(Workspace):
         cell_costs: npt.ArrayLike | None = None,
     ) -> None:
         self.prefix: PrefixSpec = check_prefix(prefix)
-        self.c = _finite("c", c, minimum=0.0)
-        self.beta = _finite("beta", beta, minimum=0.0)
+        self.c = check_finite("c", c, minimum=0.0)
+        self.beta = check_finite("beta", beta, minimum=0.0)
         self.ties: Ties = check_choice("ties", ties, ("expected", "strict"))
-        self.tie_tolerance = _finite("tie_tolerance", tie_tolerance, minimum=0.0)
-        self.human = check_choice("human", human, ("shortest",))
-        self.relocation_cost = _finite("relocation_cost", relocation_cost, minimum=0.0)
+        self.tie_tolerance = check_finite("tie_tolerance", tie_tolerance, minimum=0.0)
+        self.relocation_cost = check_finite("relocation_cost", relocation_cost, minimum=0.0)
         self.recipes = check_recipes(recipes)
         self.pots = pots
         self._custom_task = TaskGraph.from_dict(task) if isinstance(task, Mapping) else task
@@ -119,17 +126,19 @@ class OvercookedWorkspace(Workspace):
         )
         self.shape, self.stations = self.rules.shape, self.rules.stations
         self.ranked = self._checked_ranked(ranked)
+        people = check_human(human, rationality, horizon, len(self.rules.inner))
+        self.human, self.rationality, self.horizon = people.name, people.rationality, people.horizon
         self._tables = make_tables(
             self.task,
             self.stations,
-            num_floor=len(self.rules.inner),
+            num_floor=max(len(self.rules.inner), self.horizon or 0),
             prefix=self.prefix,
             beta=self.beta,
             c=self.c,
             ties=self.ties,
             tie_tolerance=self.tie_tolerance,
         )
-        self.cell_costs = self._checked_costs(cell_costs)
+        self.cell_costs = check_costs(cell_costs, self.shape, self.tie_tolerance)
         self._home = None if self.start_from is None else self.rules.encode(self.start_from)
 
     def _locked_cells(self, locked: Mapping[str, Cell] | Sequence[str] | None) -> dict[str, Cell]:
@@ -152,19 +161,6 @@ class OvercookedWorkspace(Workspace):
         if not names or len(set(names)) != len(names) or any(name not in self.stations for name in names):
             raise ValueError(f"ranked must be 'all' or different ones of {list(self.stations)}, got {ranked!r}")
         return tuple(names)
-
-    def _checked_costs(self, cell_costs: npt.ArrayLike | None) -> Array | None:
-        if cell_costs is None:
-            return None
-        costs = np.array(cell_costs, dtype=np.float64)
-        if costs.shape != self.shape:
-            raise ValueError(f"cell_costs must have shape {self.shape}, got {costs.shape}")
-        inner = costs[1:-1, 1:-1]
-        least = max(1e-6, 2 * self.tie_tolerance)
-        if not np.isfinite(inner).all() or inner.min() < least:
-            raise ValueError(f"cell_costs of inner cells must be finite and at least {least:g}, got {inner.min():g}")
-        costs.setflags(write=False)
-        return costs
 
     # -- genomes ---------------------------------------------------------------------------------------------------
 
@@ -263,12 +259,16 @@ class OvercookedWorkspace(Workspace):
         batch, in_range = self._as_int8(genomes)
         legibility, distance = np.empty(len(batch)), np.empty(len(batch))
         kernels.score_genomes(batch, self.rules.geometry, self._tables, legibility, distance)
-        if self.cell_costs is not None:
+        costs = np.ones(self.rules.geometry.num_cells) if self.cell_costs is None else self.cell_costs.ravel()
+        if self.rationality is not None and self.horizon is not None:
+            from legible_envs.overcooked.boltzmann_kernels import score_genomes_boltzmann
+
+            people = self.ties == "strict", self.rationality, self.horizon
+            score_genomes_boltzmann(batch, self.rules.geometry, self._tables, costs, *people, legibility)
+        elif self.cell_costs is not None:
             from legible_envs.overcooked.weighted import score_genomes_weighted
 
-            score_genomes_weighted(
-                batch, self.rules.geometry, self._tables, self.cell_costs.ravel(), self.ties == "strict", legibility
-            )
+            score_genomes_weighted(batch, self.rules.geometry, self._tables, costs, self.ties == "strict", legibility)
         legibility[~in_range] = np.nan
         distance[~in_range] = np.nan
         return legibility, distance
@@ -329,6 +329,9 @@ class OvercookedWorkspace(Workspace):
             "ties": self.ties,
             "tie_tolerance": self.tie_tolerance,
             "cell_costs": self.cell_costs,
+            "human": self.human,
+            "rationality": self.rationality,
+            "horizon": self.horizon,
         }
 
     def _one(self, genome: npt.ArrayLike | OvercookedLayout) -> OvercookedLayout:
@@ -365,6 +368,7 @@ class OvercookedWorkspace(Workspace):
             "ties": self.ties,
             "tie_tolerance": self.tie_tolerance,
             "human": self.human,
+            **({} if self.human == "shortest" else {"rationality": self.rationality, "horizon": self.horizon}),
             "recipes": [list(recipe) for recipe in self.recipes],
             "pots": self.pots,
             "task": None if self._custom_task is None else self._custom_task.to_dict(),
@@ -382,13 +386,3 @@ class OvercookedWorkspace(Workspace):
         from legible_envs.workspace import make_workspace
 
         return make_workspace, (self.to_config(),)
-
-
-def _finite(name: str, value: float, minimum: float) -> float:
-    if (
-        isinstance(value, bool)
-        or not isinstance(value, int | float | np.number)
-        or not minimum <= float(value) < np.inf
-    ):
-        raise ValueError(f"{name} must be a finite number >= {minimum:g}, got {value!r}")
-    return float(value)

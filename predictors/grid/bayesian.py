@@ -2,31 +2,57 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, Final, Literal, Self
 
 import numpy as np
 import numpy.typing as npt
+from sklearn.base import clone
 
+from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.rollouts import Trajectory
-from predictors.grid.distances import GridPredictor, check_walk, remaining_steps
+from predictors.grid.distances import GridPredictor, check_complete, posterior, remaining_steps
+from predictors.grid.graphs import optimal_costs, soft_costs, walk_graph
+from predictors.grid.maxent_irl import MaxEntIRL
+from predictors.grid.priors import GoalPrior, Prior
+from predictors.grid.walk_likelihood import best_uniform_cost, collect_evidence
 
 __all__ = ["BayesianGoalPredictor"]
+
+Costs = Literal["hard", "soft"]
+CellCosts = Literal["uniform", "learned"] | MaxEntIRL | npt.NDArray[np.float64]
+
+_MARGIN: Final = 0.25
 
 
 class BayesianGoalPredictor(GridPredictor):
     r"""The posterior over goals of a person who walks nearly optimally.
 
-    ``P(G | S->Q) ∝ exp(-beta (C(S->Q) + C*(Q->G) - C*(S->G)))`` (Eq. 1 of Tung et al., HRI 2024, after Dragan and
-    Srinivasa, 2013), with a uniform prior, every step costing 1 and ``C*`` the cost of the cheapest way. The cost so
-    far, ``C(S->Q)``, is the same for every goal and cancels: the belief depends on where the person began and where he
-    is now. ``S`` is the first floor cell of the walk. With nothing or one cell observed the belief is the prior.
+    ``P(G | S->Q) ∝ P(G) exp(-beta (C(S->Q) + C*(Q->G) - C*(S->G)))`` (Eq. 1 of Tung et al., HRI 2024, after Dragan and
+    Srinivasa, 2013). The cost so far, ``C(S->Q)``, is the same for every goal and cancels: the belief depends on where
+    the person began and where he is now. ``S`` is the first floor cell of the walk. With nothing or one cell observed
+    the belief is the prior.
+
+    ``C*`` is the cost of the cheapest way (``costs="hard"``), or that of all ways together, ``-log(Z) / beta`` with
+    ``Z`` the sum of ``exp(-beta C)`` over all walks (``costs="soft"``); with the latter Eq. 1 is the exact posterior of
+    people who take each walk with probability proportional to ``exp(-beta C)``.
 
     Args:
-        beta: Rationality, per step: 0 learns nothing from the way, larger values judge detours more sharply. Which goal
-            is on top does not depend on it.
+        beta: Rationality, per unit of cost: 0 learns nothing from the way, larger values judge detours more sharply.
+            With hard costs and a uniform prior, which goal is on top does not depend on it. ``"fit"``: the value that
+            makes the walks of ``fit`` most likely (uniform costs only). None: 1; but with soft uniform costs, in
+            kitchens so open that the sum over walks diverges at 1, .25 more than where it begins to be finite.
+        costs: ``"hard"`` or ``"soft"``. Soft costs need a ``beta`` at which the sum over walks is finite: at uniform
+            costs above 1.25 in a room of 5 x 5 cells, 1.39 suffices anywhere.
+        cell_costs: What entering a cell costs: ``"uniform"``: 1. ``"learned"``: what :class:`MaxEntIRL` learns in
+            ``fit``. A ``MaxEntIRL`` with other settings, which is cloned and fitted. Or the ``(H, W)`` costs
+            themselves, the same for all kitchens of this shape.
+        prior: ``"uniform"`` over candidates, or ``"empirical"``: as often as each was chosen in ``fit``.
 
     Attributes:
         classes_: ``(K,)`` names of all goals and candidates seen in ``fit``, sorted.
+        beta_: The rationality used (without the correction of ``beta=None``).
+        irl_: The fitted :class:`MaxEntIRL`, with learned costs.
 
     Example:
         >>> from legible_envs.overcooked import OvercookedLayout
@@ -37,17 +63,95 @@ class BayesianGoalPredictor(GridPredictor):
         [[0.5, 0.5], [0.881, 0.119]]
     """
 
-    def __init__(self, beta: float = 1.0) -> None:
+    beta_: float
+    irl_: MaxEntIRL
+
+    def __init__(
+        self,
+        beta: float | Literal["fit"] | None = None,
+        *,
+        costs: Costs = "hard",
+        cell_costs: CellCosts = "uniform",
+        prior: Prior = "uniform",
+    ) -> None:
         self.beta = beta
+        self.costs = costs
+        self.cell_costs = cell_costs
+        self.prior = prior
 
-    def fit(self, X: Any, y: object = None) -> BayesianGoalPredictor:  # type: ignore[override]
-        """Learn the names of the goals; see :meth:`GoalPredictor.fit`."""
-        self._check_beta()
-        return super().fit(X, y)
+    def fit(self, X: Sequence[Trajectory], y: object = None) -> Self:
+        """Learn the names of the goals, and what the parameters leave to learning; see :meth:`GoalPredictor.fit`.
 
-    def _check_beta(self) -> None:
-        if isinstance(self.beta, bool) or not isinstance(self.beta, int | float) or not 0 <= self.beta < np.inf:
-            raise ValueError(f"`beta` must be a finite number >= 0, got {self.beta!r}")
+        Raises:
+            ValueError: Bad parameters, no walks, or, where something is learned from them, incomplete walks.
+        """
+        self._check_parameters()
+        super().fit(X, y)
+        walks = list(X)
+        self._prior = GoalPrior(self.prior, walks, self.classes_)
+        self._tables: dict[tuple[OvercookedLayout, tuple[str, ...]], npt.NDArray[np.float64]] = {}
+        if self.beta == "fit":
+            for number, walk in enumerate(walks):
+                check_complete(walk, number)
+            self.beta_ = best_uniform_cost(collect_evidence(walks))
+        else:
+            self.beta_ = 1.0 if self.beta is None else float(self.beta)
+        self.__dict__.pop("irl_", None)
+        if isinstance(self.cell_costs, MaxEntIRL):
+            self.irl_ = clone(self.cell_costs).fit(walks)
+        elif isinstance(self.cell_costs, str) and self.cell_costs == "learned":
+            self.irl_ = MaxEntIRL().fit(walks)
+        return self
+
+    def _check_parameters(self) -> None:
+        beta = self.beta
+        if beta == "fit":
+            if not isinstance(self.cell_costs, str) or self.cell_costs != "uniform":
+                raise ValueError("`beta='fit'` goes with uniform costs; learned costs are in nats: leave `beta` at 1")
+        elif beta is not None and (
+            isinstance(beta, bool) or not isinstance(beta, int | float) or not 0 <= beta < np.inf
+        ):
+            raise ValueError(f"`beta` must be a finite number >= 0, 'fit' or None, got {beta!r}")
+        if self.costs not in ("hard", "soft"):
+            raise ValueError(f"`costs` must be 'hard' or 'soft', got {self.costs!r}")
+        if isinstance(self.cell_costs, str) and self.cell_costs not in ("uniform", "learned"):
+            raise ValueError(
+                f"`cell_costs` must be 'uniform', 'learned', a MaxEntIRL or an (H, W) array, got {self.cell_costs!r}"
+            )
+
+    def goal_costs(self, layout: OvercookedLayout, goals: tuple[str, ...]) -> npt.NDArray[np.float64]:
+        """``(H, W, K)`` optimal costs from each cell into each goal, times ``beta``.
+
+        Raises:
+            LayoutError: A goal is not a station of this kitchen.
+            ValueError: Soft costs where the sum over walks diverges, or cell costs of another shape.
+        """
+        table = self._tables.get((layout, goals))
+        if table is None:
+            if len(self._tables) >= 256:
+                self._tables.clear()
+            table = self._tables[layout, goals] = self._make_table(layout, goals)
+        return table
+
+    def _make_table(self, layout: OvercookedLayout, goals: tuple[str, ...]) -> npt.NDArray[np.float64]:
+        uniform = isinstance(self.cell_costs, str) and self.cell_costs == "uniform"
+        if self.beta_ == 0:  # where there is no way it stays infinitely far
+            return np.where(np.isinf(remaining_steps(layout, goals)), np.inf, 0.0)
+        if self.costs == "hard" and uniform:
+            return self.beta_ * remaining_steps(layout, goals)
+        if uniform:
+            costs = np.ones(layout.shape)
+        else:
+            costs = self.irl_.cost_map(layout) if hasattr(self, "irl_") else np.asarray(self.cell_costs, np.float64)
+        if self.costs == "hard":
+            return self.beta_ * optimal_costs(layout, goals, costs)
+        beta = self.beta_
+        if uniform and self.beta is None:
+            beta = max(beta, walk_graph(layout, goals).divergence_cost + _MARGIN)
+        try:
+            return soft_costs(layout, goals, beta * costs)
+        except ValueError as error:
+            raise ValueError(f"{error}; raise `beta` ({self.beta_:.4g}) or give beta='fit'") from error
 
     def candidate_probabilities(self, walk: Trajectory) -> npt.NDArray[np.float64]:
         """``(len(walk.candidates),)`` probabilities in the order of the walk's candidates.
@@ -55,19 +159,11 @@ class BayesianGoalPredictor(GridPredictor):
         Raises:
             ValueError: A walk that does not fit its layout, or a candidate that cannot be reached from its start.
         """
-        self._check_beta()
-        layout = check_walk(walk)
-        count = len(walk.candidates)
-        if walk.num_states == 0:
-            return np.full(count, 1.0 / count)
-        steps = remaining_steps(layout, walk.candidates)
-        (first_row, first_col), (row, col) = walk.states[0].tolist(), walk.states[-1].tolist()
-        optimal = steps[first_row, first_col]
-        if np.isinf(optimal).any():
-            goal = walk.candidates[int(np.isinf(optimal).argmax())]
-            raise ValueError(f"the candidate {goal!r} cannot be reached from row {first_row}, column {first_col}")
-        excess = steps[row, col] - optimal
-        possible = np.isfinite(excess)  # nobody inside a station walks on to another
-        weights = np.zeros(count)
-        weights[possible] = np.exp(-self.beta * (excess[possible] - excess.min()))
-        return weights / weights.sum()
+        return posterior(walk, self._prior.of(walk.candidates), self.goal_costs)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without the tables, which are made again when asked for."""
+        state = dict(super().__getstate__())
+        if "_tables" in state:
+            state["_tables"] = {}
+        return state

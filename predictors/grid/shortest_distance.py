@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Sequence
+from typing import Literal, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -10,10 +11,11 @@ import numpy.typing as npt
 from legible_envs.rollouts import Trajectory
 from predictors.base import TIE_TOLERANCE
 from predictors.grid.distances import GridPredictor, check_walk, remaining_steps
+from predictors.reaching.places import goal_places, learn_places, straight_lines
 
 __all__ = ["ShortestDistance"]
 
-Metric = Literal["manhattan", "geodesic"]
+Metric = Literal["manhattan", "geodesic", "euclidean"]
 
 
 class ShortestDistance(GridPredictor):
@@ -24,7 +26,8 @@ class ShortestDistance(GridPredictor):
 
     Args:
         metric: ``"manhattan"``: rows plus columns to the station, through walls. ``"geodesic"``: steps of the shortest
-            way into the station.
+            way into the station. ``"euclidean"``: the straight line, for reaches, to where a trajectory's
+            ``goal_positions`` say or else reaches ended in ``fit``.
 
     Attributes:
         classes_: ``(K,)`` names of all goals and candidates seen in ``fit``, sorted.
@@ -41,14 +44,22 @@ class ShortestDistance(GridPredictor):
     def __init__(self, metric: Metric = "manhattan") -> None:
         self.metric = metric
 
+    def fit(self, X: Sequence[Trajectory], y: object = None) -> Self:
+        """Learn the goals' names (and places, for the Euclidean metric); see :meth:`GoalPredictor.fit`."""
+        super().fit(X, y)
+        self.places_ = learn_places(X) if self.metric == "euclidean" else {}
+        return self
+
     def candidate_probabilities(self, walk: Trajectory) -> npt.NDArray[np.float64]:
         """``(len(walk.candidates),)`` probabilities in the order of the walk's candidates.
 
         Raises:
             ValueError: An unknown metric, or a walk that does not fit its layout.
         """
-        if self.metric not in ("manhattan", "geodesic"):
-            raise ValueError(f"`metric` must be 'manhattan' or 'geodesic', got {self.metric!r}")
+        if self.metric not in ("manhattan", "geodesic", "euclidean"):
+            raise ValueError(f"`metric` must be 'manhattan', 'geodesic' or 'euclidean', got {self.metric!r}")
+        if self.metric == "euclidean":
+            return self._nearest(self._straight_lines(walk))
         layout = check_walk(walk)
         count = len(walk.candidates)
         if not walk.num_states:
@@ -66,5 +77,14 @@ class ShortestDistance(GridPredictor):
             distances = np.abs(stations - (row, col)).sum(axis=1).astype(np.float64)
         if np.isinf(distances).all():
             raise ValueError(f"no candidate of {walk.candidates} can be reached from row {row}, column {col}")
+        return self._nearest(distances)
+
+    def _straight_lines(self, walk: Trajectory) -> npt.NDArray[np.float64]:
+        if not walk.num_states:
+            return np.zeros(len(walk.candidates))
+        return straight_lines(walk.states[-1], goal_places(walk, self.places_))
+
+    @staticmethod
+    def _nearest(distances: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         nearest = distances <= distances.min() + TIE_TOLERANCE
         return nearest / nearest.sum()

@@ -1,0 +1,174 @@
+"""Tasks on a table: what to build from which objects, in which order, read from a YAML file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from legible_envs.errors import TaskError
+from legible_envs.tabletop.layout import TabletopLayout
+from legible_envs.tabletop.things import Point, point, rectangle, rectangles_overlap
+from legible_envs.tasks import TaskGraph
+
+__all__ = ["TabletopTask", "task_names"]
+
+_SCHEMA = 1
+
+
+def task_names() -> tuple[str, ...]:
+    """Names of the tasks that come with the package."""
+    folder = resources.files("legible_envs.tabletop") / "tasks"
+    return tuple(sorted(entry.name.removesuffix(".yaml") for entry in folder.iterdir() if entry.name.endswith(".yaml")))
+
+
+@dataclass(frozen=True)
+class TabletopTask:
+    """A task on a table.
+
+    Attributes:
+        name: Its name.
+        layout: The table with all objects where a sorted, undesigned arrangement puts them.
+        graph: The precedence of the reaches: goals are objects, places are objects and the table's starts.
+        configuration: Where each object belongs in the end, ``(x, y)`` of its centre; objects left out stay anywhere.
+
+    Raises:
+        TaskError: The graph names places the table lacks, the configuration names unknown objects, objects that must
+            stay where they are, or places that lie off the table or overlap.
+        LayoutError: The arrangement is not a valid layout.
+
+    Example:
+        >>> task = TabletopTask.named("tea")
+        >>> [o.name for o in task.layout.objects], task.graph.num_sequences
+        (['cup', 'teabag', 'kettle', 'milk', 'sugar'], 12)
+    """
+
+    name: str
+    layout: TabletopLayout
+    graph: TaskGraph
+    configuration: Mapping[str, Point] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name:
+            raise TaskError(f"a task needs a non-empty name, got {self.name!r}")
+        known = {*self.layout.goals, *self.layout.table.starts}
+        unknown = [place for place in self.graph.places if place not in known]
+        if unknown:
+            raise TaskError(f"task {self.name!r} needs {unknown}, which the table lacks; it has {sorted(known)}")
+        starts = [goal for goal in self.graph.goals if goal in self.layout.table.starts]
+        if starts:
+            raise TaskError(f"task {self.name!r} has the goals {starts}, which are no objects")
+        self.layout.validate()
+        self._check_configuration()
+
+    def _check_configuration(self) -> None:
+        if not isinstance(self.configuration, Mapping):
+            raise TaskError(f"`configuration` must map objects to (x, y), got {type(self.configuration).__name__}")
+        object.__setattr__(
+            self,
+            "configuration",
+            {name: point(at, f"the place of {name!r}") for name, at in self.configuration.items()},
+        )
+        width, depth = self.layout.table.size
+        placed: list[tuple[str, Any]] = []
+        for name, at in self.configuration.items():
+            if name not in self.layout.goals:
+                raise TaskError(f"the configuration places {name!r}; the objects are {list(self.layout.goals)}")
+            thing = self.layout.objects[self.layout.index(name)]
+            if not thing.movable:
+                raise TaskError(f"the configuration places {name!r}, which is not movable")
+            corners = rectangle(*at, thing.angle, *thing.size)
+            if (corners < -1e-9).any() or (corners > np.array([width, depth]) + 1e-9).any():
+                raise TaskError(f"the configuration places {name!r} at {at}, off the table of {width:g} x {depth:g} m")
+            for other, taken in placed:
+                if rectangles_overlap(corners, taken):
+                    raise TaskError(f"the configuration places {other!r} and {name!r} over each other")
+            placed.append((name, corners))
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.layout, self.graph, tuple(self.configuration.items())))
+
+    # -- in and out ----------------------------------------------------------------------------------------------------
+
+    @classmethod
+    def named(cls, name: str) -> TabletopTask:
+        """One of the tasks that come with the package, see :func:`task_names`.
+
+        Raises:
+            TaskError: There is none of this name.
+        """
+        if name not in task_names():
+            raise TaskError(f"no task {name!r}; there are {list(task_names())}, or give the path of a YAML file")
+        text = (resources.files("legible_envs.tabletop") / "tasks" / f"{name}.yaml").read_text(encoding="utf-8")
+        return cls.from_yaml(text)
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> TabletopTask:
+        """Build a task from plain data.
+
+        Args:
+            data: ``name``, ``objects``, ``task`` (see :meth:`~legible_envs.tasks.TaskGraph.from_dict`), and optionally
+                ``table``, ``configuration`` and ``schema`` (1).
+
+        Raises:
+            TaskError: A missing or unknown key, or anything this class or the graph rejects.
+            LayoutError: Anything the layout rejects.
+        """
+        keys = {"schema", "name", "table", "objects", "configuration", "task"}
+        if not isinstance(data, Mapping):
+            raise TaskError(f"a task must be a mapping with the keys {sorted(keys)}, got {type(data).__name__}")
+        unknown = sorted(str(key) for key in data if key not in keys)
+        missing = sorted({"name", "objects", "task"} - data.keys())
+        if unknown or missing:
+            raise TaskError(
+                f"the task has missing keys {missing} and unknown keys {unknown}; required: name, objects, task, "
+                "optional: schema, table, configuration"
+            )
+        if data.get("schema", _SCHEMA) != _SCHEMA:
+            raise TaskError(f"expected a task with `schema` {_SCHEMA}, got {data['schema']!r}")
+        layout = TabletopLayout.from_dict({"schema": 1, "objects": data["objects"], "table": data.get("table") or {}})
+        return cls(data["name"], layout, TaskGraph.from_dict(data["task"]), data.get("configuration") or {})
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data that :meth:`from_dict` reads back to an equal task."""
+        layout = self.layout.to_dict()
+        return {
+            "schema": _SCHEMA,
+            "name": self.name,
+            "table": layout["table"],
+            "objects": layout["objects"],
+            "configuration": {name: list(at) for name, at in self.configuration.items()},
+            "task": self.graph.to_dict(),
+        }
+
+    @classmethod
+    def from_yaml(cls, source: str | Path) -> TabletopTask:
+        """Read a YAML file (a ``Path``, or a string naming a ``.yaml``/``.yml`` file) or YAML text.
+
+        Raises:
+            TaskError: Not YAML, or not a task.
+            LayoutError: Not a valid arrangement.
+            FileNotFoundError: The file does not exist.
+        """
+        import yaml
+
+        is_file = isinstance(source, Path) or ("\n" not in source and source.endswith((".yaml", ".yml")))
+        text = Path(source).read_text(encoding="utf-8") if is_file else str(source)
+        try:
+            data = yaml.safe_load(text)
+        except yaml.YAMLError as error:
+            raise TaskError(f"not valid YAML: {error}") from error
+        return cls.from_dict(data)
+
+    def to_yaml(self, path: str | Path | None = None) -> str:
+        """Return the task as YAML text, and write it to ``path`` if given."""
+        import yaml
+
+        text = yaml.safe_dump(self.to_dict(), sort_keys=False, allow_unicode=True)
+        if path is not None:
+            Path(path).write_text(text, encoding="utf-8")
+        return text

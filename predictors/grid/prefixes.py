@@ -1,0 +1,169 @@
+"""Prefixes of walks as numbers, and the base of the predictors that learn from them without a model of people."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from typing import Self
+
+import numpy as np
+import numpy.typing as npt
+
+from legible_envs.overcooked.layout import OvercookedLayout
+from legible_envs.rollouts import Trajectory
+from predictors.grid.distances import GridPredictor, check_complete, check_walk, remaining_steps
+from predictors.grid.priors import GoalPrior
+
+__all__ = ["PrefixEncoder", "PrefixPredictor", "distinct_prefixes"]
+
+Floats = npt.NDArray[np.float64]
+Steps = tuple[tuple[int, int], ...]
+
+
+class PrefixEncoder:
+    """Turns observed floor cells into feature vectors.
+
+    Features, in this order: which start station, first cell, cell now, cell before (one-hot over those seen), start
+    station and cell now together, the share of the prefix spent on each cell, the number of cells so far, and for each
+    goal how much nearer it has come per step taken (1: straight toward it, -1: straight away).
+
+    Args:
+        walks: Complete walks whose stations and cells the one-hot features are for; others are zero.
+        classes: ``(K,)`` names of goals.
+    """
+
+    def __init__(self, walks: Sequence[Trajectory], classes: npt.NDArray[np.str_]) -> None:
+        self._classes = tuple(classes.tolist())
+        self._places: dict[OvercookedLayout, int] = {}
+        self._index: dict[tuple[object, ...], int] = {}
+        for walk in walks:
+            place = self._places.setdefault(_layout_of(walk), len(self._places))
+            cells = tuple(map(tuple, walk.states[:-1].tolist()))
+            for end in range(1, len(cells) + 1):
+                for key, _ in _one_hot(place, walk.start, cells[:end]):
+                    self._index.setdefault(key, len(self._index))
+        self.width = len(self._index) + 1 + len(self._classes)
+
+    def encode(self, walk: Trajectory, cells: Steps) -> Floats:
+        """``(width,)`` features of the first cells of a walk, at least one."""
+        layout, row = _layout_of(walk), np.zeros(self.width)
+        for key, value in _one_hot(self._places.get(layout, -1), walk.start, cells):
+            column = self._index.get(key)
+            if column is not None:
+                row[column] += value
+        row[len(self._index)] = min(len(cells), 20) / 10.0
+        stations = layout.stations
+        known = [column for column, name in enumerate(self._classes) if name in stations]
+        steps = remaining_steps(layout, tuple(self._classes[column] for column in known))
+        for column, first, now in zip(known, steps[cells[0]].tolist(), steps[cells[-1]].tolist(), strict=True):
+            if first < np.inf and now < np.inf:
+                row[len(self._index) + 1 + column] = (first - now) / max(len(cells) - 1, 1)
+        return row
+
+
+def _layout_of(walk: Trajectory) -> OvercookedLayout:
+    assert walk.layout is not None
+    return walk.layout
+
+
+def _one_hot(place: int, start: str, cells: Steps) -> list[tuple[tuple[object, ...], float]]:
+    """What is the case, and how much; ``place`` numbers the kitchen."""
+    values: list[tuple[tuple[object, ...], float]] = [
+        (("start", place, start), 1.0),
+        (("first", place, cells[0]), 1.0),
+        (("now", place, cells[-1]), 1.0),
+        (("both", place, start, cells[-1]), 1.0),
+        *((("visited", place, cell), 1.0 / len(cells)) for cell in cells),
+    ]
+    if len(cells) > 1:
+        values.append((("before", place, cells[-2]), 1.0))
+    return values
+
+
+class PrefixPredictor(GridPredictor):
+    """Learns from all prefixes of complete walks; subclasses define ``_learn`` and ``_read``.
+
+    Nothing observed: the prior, as often as each goal was chosen. Someone inside a candidate station has reached it.
+    """
+
+    def fit(self, X: Sequence[Trajectory], y: object = None) -> Self:
+        """Learn from complete walks.
+
+        Raises:
+            ValueError: No walks, prefixes, walks that do not fit their layout (naming the cell), or bad parameters.
+        """
+        self._check_parameters()
+        super().fit(X, y)
+        walks = list(X)
+        for number, walk in enumerate(walks):
+            check_complete(walk, number)
+        self._prior = GoalPrior("empirical", walks, self.classes_)
+        self._learn(walks)
+        return self
+
+    def _check_parameters(self) -> None:
+        """Raise ``ValueError`` if a parameter is bad."""
+
+    @abstractmethod
+    def _learn(self, walks: Sequence[Trajectory]) -> None:
+        """Learn from checked walks."""
+
+    @abstractmethod
+    def _read(self, walk: Trajectory, cells: Steps) -> Floats:
+        """``(K,)`` weights of all goals >= 0 in the order of ``classes_``, given at least one floor cell."""
+
+    def candidate_probabilities(self, walk: Trajectory) -> Floats:
+        """``(len(walk.candidates),)`` probabilities in the order of the walk's candidates.
+
+        Raises:
+            ValueError: A walk that does not fit its layout.
+        """
+        layout = check_walk(walk)
+        missing = [name for name in walk.candidates if name not in layout.stations]
+        if missing:
+            raise ValueError(
+                f"the candidates {missing} are no stations of the layout, which has {list(layout.stations)}"
+            )
+        prior = self._prior.of(walk.candidates)
+        cells: Steps = tuple(map(tuple, walk.states.tolist()))
+        if not cells:
+            return prior
+        reached = layout.station_at(cells[-1])
+        if reached is not None:
+            return np.array([float(name == reached) for name in walk.candidates])
+        weights = self._read(walk, cells)[self._columns(walk)]
+        total = weights.sum()
+        return weights / total if total > 0 else prior
+
+
+def distinct_prefixes(
+    walks: Sequence[Trajectory], encoder: PrefixEncoder, classes: npt.NDArray[np.str_]
+) -> tuple[Floats, Floats]:
+    """All prefixes of walks, equal ones once.
+
+    Args:
+        walks: Complete walks.
+        encoder: Of their prefixes.
+        classes: ``(K,)`` names of goals.
+
+    Returns:
+        ``(U, width)`` features, and ``(U, K)`` weights: how many walks to each goal have this prefix, each counting by
+        the share of it that one cell is: who is judged at fractions observed meets the cells of short walks more often.
+    """
+    column = {name: number for number, name in enumerate(classes.tolist())}
+    rows: dict[tuple[object, ...], int] = {}
+    places: dict[OvercookedLayout, int] = {}
+    features: list[Floats] = []
+    weights: list[Floats] = []
+    for walk in walks:
+        cells: Steps = tuple(map(tuple, walk.states[:-1].tolist()))
+        place = places.setdefault(_layout_of(walk), len(places))
+        for end in range(1, len(cells) + 1):
+            key = (place, walk.start, cells[:end])
+            row = rows.get(key)
+            if row is None:
+                row = rows[key] = len(features)
+                features.append(encoder.encode(walk, cells[:end]))
+                weights.append(np.zeros(len(column)))
+            weights[row][column[walk.goal or ""]] += 1.0 / len(cells)
+    return np.array(features), np.array(weights)

@@ -1,0 +1,53 @@
+"""What is believed before a person moves."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import Final, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from legible_envs.rollouts import Trajectory
+
+__all__ = ["PRIORS", "GoalPrior", "Prior"]
+
+Prior = Literal["uniform", "empirical"]
+
+PRIORS: Final = ("uniform", "empirical")
+
+
+class GoalPrior:
+    """Probabilities of goals before anything is observed.
+
+    ``"uniform"``: all candidates alike. ``"empirical"``: as often as each was chosen where it could be, one more
+    choice of each goal added (Laplace), so that a goal that was never chosen stays possible.
+
+    Args:
+        kind: ``"uniform"`` or ``"empirical"``.
+        walks: Trajectories to count goals in; those without a known goal are passed over.
+        classes: ``(K,)`` names of all goals.
+
+    Raises:
+        ValueError: Another kind.
+    """
+
+    def __init__(self, kind: Prior, walks: Sequence[Trajectory], classes: npt.NDArray[np.str_]) -> None:
+        if kind not in PRIORS:
+            raise ValueError(f"`prior` must be one of {PRIORS}, got {kind!r}")
+        self._rates: dict[str, float] = {}
+        if kind == "empirical":
+            known = [walk for walk in walks if walk.goal is not None]
+            chosen = Counter(walk.goal for walk in known)
+            offered = Counter(name for walk in known for name in walk.candidates)
+            names = classes.tolist()
+            self._rates = {name: (chosen[name] + 1.0) / (offered[name] + len(names)) for name in names}
+
+    def of(self, candidates: Sequence[str]) -> npt.NDArray[np.float64]:
+        """``(len(candidates),)`` probabilities in their order."""
+        count = len(candidates)
+        if not self._rates:
+            return np.full(count, 1.0 / count)
+        rates = np.array([self._rates[name] for name in candidates])
+        return rates / rates.sum()

@@ -1,0 +1,1 @@
+"""Predictors learned by small neural networks: trained with torch, used without it."""

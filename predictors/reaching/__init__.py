@@ -1,0 +1,1 @@
+"""Predictors for reaches over a table: positions instead of cells."""

@@ -1,0 +1,162 @@
+"""Plain classifiers of the hand's position, velocity and time: what a predictor of reaches must beat."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+from sklearn.linear_model import LogisticRegression
+from sklearn.neighbors import KNeighborsClassifier
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import PolynomialFeatures, StandardScaler
+
+from legible_envs.rollouts import Cut, Trajectory
+from predictors.base import FRACTIONS, GoalPredictor
+from predictors.reaching.features import Reach, check_dimension, check_reaches
+
+__all__ = ["ReachLogistic", "ReachNeighbours"]
+
+
+class _MomentClassifier(GoalPredictor):
+    """Learns from every moment of every reach, and looks at the newest moment only.
+
+    The features are the position and velocity relative to the start, and the time since. Goals that are no candidates
+    are masked; with no or one position observed the belief is how often each goal was reached in ``fit``.
+    """
+
+    def fit(self, X: Sequence[Trajectory], y: object = None) -> Self:
+        """Learn from complete reaches.
+
+        Args:
+            X: Reaches with at least two states, some duration and a known goal, all of one dimension.
+            y: Ignored; goals are part of the trajectories.
+
+        Raises:
+            ValueError: Parameters out of range; a prefix, an unknown goal, a reach of one state, mixed dimensions.
+        """
+        super().fit(X, y)
+        walks = list(X)
+        self.n_dims_ = check_reaches(walks)
+        goals = np.array([walk.goal for walk in walks])
+        self.goals_, counts = np.unique(goals, return_counts=True)
+        self.prior_ = counts / counts.sum()
+        moments = [_moments(walk)[1:] for walk in walks]
+        labels = np.repeat(np.searchsorted(self.goals_, goals), [len(rows) for rows in moments])
+        self._classifier = self._make(len(labels)).fit(np.concatenate(moments), labels) if len(counts) > 1 else None
+        return self
+
+    @abstractmethod
+    def _make(self, moments: int) -> Any:
+        """An unfitted classifier for so many moments."""
+
+    def _smoothed(self, weights: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """``(n, G)`` probabilities of the classifier, as they are unless it is surer than it can be."""
+        return weights
+
+    def predict_proba(self, X: Sequence[Trajectory]) -> npt.NDArray[np.float64]:
+        """See :meth:`GoalPredictor.predict_proba`."""
+        walks = self._check_trajectories(X)
+        rows: list[npt.NDArray[np.float64] | None] = []
+        for walk in walks:
+            self._columns(walk)
+            check_dimension(walk, self.n_dims_)
+            rows.append(_moments(walk)[-1] if walk.num_states > 1 else None)
+        return self._beliefs(walks, rows)
+
+    def predict_proba_at(
+        self, X: Sequence[Trajectory], fractions: Sequence[float] = FRACTIONS, cut: Cut = "steps"
+    ) -> npt.NDArray[np.float64]:
+        """See :meth:`GoalPredictor.predict_proba_at`; features of a reach are computed once for all fractions."""
+        walks = self._check_trajectories(X)
+        rows: list[npt.NDArray[np.float64] | None] = []
+        for walk in walks:
+            self._columns(walk)
+            check_dimension(walk, self.n_dims_)
+            moments = _moments(walk)
+            lengths = [walk.prefix_length(fraction, cut) for fraction in fractions]
+            rows += [moments[length - 1] if length > 1 else None for length in lengths]
+        beliefs = self._beliefs([walk for walk in walks for _ in fractions], rows)
+        return beliefs.reshape(len(walks), len(fractions), len(self.classes_))
+
+    def _beliefs(
+        self, walks: Sequence[Trajectory], rows: Sequence[npt.NDArray[np.float64] | None]
+    ) -> npt.NDArray[np.float64]:
+        """``(n, C)`` beliefs; None for a walk stands for nothing known."""
+        columns = [self._columns(walk) for walk in walks]
+        weights = np.tile(self.prior_, (len(walks), 1))
+        seen = [i for i, row in enumerate(rows) if row is not None]
+        if seen and self._classifier is not None:
+            weights[seen] = self._smoothed(self._classifier.predict_proba(np.array([rows[i] for i in seen])))
+        probabilities = np.zeros((len(walks), len(self.classes_)))
+        places = np.searchsorted(self.classes_, self.goals_)
+        for i, candidates in enumerate(columns):
+            full = np.zeros(len(self.classes_))
+            full[places] = weights[i]
+            chosen = full[candidates]
+            if chosen.sum() <= 0:  # the classifier is sure of a goal that is no candidate, or none was ever reached
+                full[places] = self.prior_
+                chosen = full[candidates] if full[candidates].any() else np.ones(len(candidates))
+            probabilities[i, candidates] = chosen / chosen.sum()
+        return probabilities
+
+
+class ReachLogistic(_MomentClassifier):
+    """Multinomial logistic regression on position, velocity and time.
+
+    Args:
+        C: Inverse strength of the L2 penalty on standardised features.
+        degree: 1: the features. 2: also their squares and products: better, and ten times slower to fit.
+
+    Attributes:
+        classes_: ``(C,)`` names of all goals and candidates seen in ``fit``, sorted.
+        goals_: ``(G,)`` names of the goals reached in ``fit``, sorted.
+        prior_: ``(G,)`` how often.
+    """
+
+    def __init__(self, C: float = 1.0, degree: int = 1) -> None:
+        self.C = C
+        self.degree = degree
+
+    def _make(self, moments: int) -> Any:
+        if self.degree not in (1, 2):
+            raise ValueError(f"`degree` must be 1 or 2, got {self.degree!r}")
+        if not 0 < self.C < np.inf:
+            raise ValueError(f"`C` must be a finite number > 0, got {self.C!r}")
+        expand = PolynomialFeatures(self.degree, include_bias=False)
+        return make_pipeline(StandardScaler(), expand, LogisticRegression(C=self.C, max_iter=300))
+
+
+class ReachNeighbours(_MomentClassifier):
+    """The goals of the most similar moments of earlier reaches, by standardised position, velocity and time.
+
+    The prior votes like one more neighbour, so that nothing is impossible because few moments were asked.
+
+    Args:
+        n_neighbors: How many moments vote; all if there are fewer.
+
+    Attributes:
+        classes_: ``(C,)`` names of all goals and candidates seen in ``fit``, sorted.
+        goals_: ``(G,)`` names of the goals reached in ``fit``, sorted.
+        prior_: ``(G,)`` how often.
+    """
+
+    def __init__(self, n_neighbors: int = 25) -> None:
+        self.n_neighbors = n_neighbors
+
+    def _make(self, moments: int) -> Any:
+        if isinstance(self.n_neighbors, bool) or not isinstance(self.n_neighbors, int) or self.n_neighbors < 1:
+            raise ValueError(f"`n_neighbors` must be an integer >= 1, got {self.n_neighbors!r}")
+        self.n_neighbors_ = min(self.n_neighbors, moments)
+        return make_pipeline(StandardScaler(), KNeighborsClassifier(self.n_neighbors_))
+
+    def _smoothed(self, weights: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        return (self.n_neighbors_ * weights + self.prior_) / (self.n_neighbors_ + 1)
+
+
+def _moments(walk: Trajectory) -> npt.NDArray[np.float64]:
+    """``(T, 2 d + 1)`` position, velocity and time of every sample."""
+    reach = Reach(walk)
+    return np.column_stack([reach.features(True), reach.times])

@@ -1,0 +1,56 @@
+"""Eq. 1 of Tung et al. (HRI 2024) for a hand that moves freely."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Self
+
+import numpy as np
+import numpy.typing as npt
+
+from legible_envs.rollouts import Trajectory
+from predictors.reaching.places import PlacePredictor, straight_lines
+
+__all__ = ["StraightLineBayesian"]
+
+
+class StraightLineBayesian(PlacePredictor):
+    r"""The posterior over goals of a hand that moves nearly straight.
+
+    ``P(G | S->Q) ∝ exp(-beta (C(S->Q) + C*(Q->G) - C*(S->G)))`` (Eq. 1 of Tung et al., HRI 2024, after Dragan and
+    Srinivasa, 2013) with a uniform prior; the cost of a way is its length and the cheapest is the straight line. The
+    length so far is the same for every goal and cancels. With nothing or one position observed the belief is the prior,
+    exactly. Goals are where a trajectory's ``goal_positions`` say, else where reaches ended in ``fit``.
+
+    Args:
+        beta: Rationality, per metre. Which goal is on top does not depend on it.
+
+    Attributes:
+        classes_: ``(K,)`` names of all goals and candidates seen in ``fit``, sorted.
+        places_: ``(d,)`` place of each goal that reaches ended at in ``fit``.
+
+    Example:
+        >>> from legible_envs.rollouts import Trajectory
+        >>> cups = {"candidates": ("left", "right"), "goal_positions": ((-0.2, 0.3), (0.2, 0.3))}
+        >>> reach = Trajectory([(0.0, 0.0), (0.05, 0.1)], goal="right", **cups)
+        >>> StraightLineBayesian().fit([reach]).predict_proba([reach.first(1), reach]).round(3).tolist()
+        [[0.5, 0.5], [0.197, 0.803]]
+    """
+
+    def __init__(self, beta: float = 20.0) -> None:
+        self.beta = beta
+
+    def fit(self, X: Sequence[Trajectory], y: object = None) -> Self:
+        """Learn the goals' names and places; see :meth:`GoalPredictor.fit`."""
+        self._check_beta()
+        return super().fit(X, y)
+
+    def _check_beta(self) -> None:
+        if isinstance(self.beta, bool) or not isinstance(self.beta, int | float) or not 0 <= self.beta < np.inf:
+            raise ValueError(f"`beta` must be a finite number >= 0, got {self.beta!r}")
+
+    def weigh(self, states: npt.NDArray[np.floating], places: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """See :meth:`PlacePredictor.weigh`."""
+        self._check_beta()
+        excess = straight_lines(states[-1], places) - straight_lines(states[0], places)
+        return np.exp(-self.beta * (excess - excess.min()))

@@ -1,0 +1,275 @@
+"""Watching one person: every registered predictor, and the rule that says when to act."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from legible_envs.rollouts import Trajectory
+from predictors import (
+    BayesianGoalPredictor,
+    GoalPredictor,
+    ShortestDistance,
+    ThresholdDecision,
+    list_predictors,
+    make_predictor,
+)
+from predictors.checks import example_walks
+from predictors.streaming import Decision, summarise_decisions
+
+BUILT_IN = sorted(name for name, info in list_predictors().items() if info.origin == "built in")
+QUICK: dict[str, dict[str, Any]] = {
+    "recurrent": {"hidden_size": 8, "members": 2, "max_epochs": 3},
+    "transformer": {"width": 8, "members": 2, "max_epochs": 3},
+}
+CORNERS = {"left": (-0.3, 0.4), "middle": (0.0, 0.5), "right": (0.3, 0.4)}
+
+
+def reaches() -> list[Trajectory]:
+    """Reaches to three places, some with only two of them possible."""
+    rng = np.random.default_rng(0)
+    found = []
+    for number in range(24):
+        names = ("right", "left") if number % 4 == 0 else tuple(CORNERS)
+        goal = names[number % len(names)]
+        way = np.linspace(0, 1, int(rng.integers(6, 10)))[:, None]
+        points = way * np.array(CORNERS[goal]) + np.cumsum(rng.normal(0, 0.004, (len(way), 2)), axis=0)
+        points = points - points[0]
+        found.append(
+            Trajectory(
+                points,
+                np.arange(len(points)) / 30,
+                goal=goal,
+                candidates=names,
+                participant=f"p{number % 4}",
+                goal_positions=tuple(CORNERS[name] for name in names),
+            )
+        )
+    return found
+
+
+def fitted(name: str) -> tuple[GoalPredictor, list[Trajectory]]:
+    """A predictor fitted to what it can read: walks in a kitchen, or else reaches."""
+    if name not in _FITTED:
+        pytest.importorskip("torch") if name in QUICK else None
+        for walks in (example_walks(), reaches()):
+            predictor = make_predictor(name, **QUICK.get(name, {}))
+            try:
+                predictor.fit(walks)
+                predictor.predict_proba(walks)
+            except (ValueError, TypeError):
+                continue
+            _FITTED[name] = (predictor, walks)
+            break
+        else:
+            raise AssertionError(f"{name} reads neither walks nor reaches")
+    return _FITTED[name]
+
+
+_FITTED: dict[str, tuple[GoalPredictor, list[Trajectory]]] = {}
+
+
+# -- every predictor ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_a_stream_says_what_prefixes_say(name: str) -> None:
+    predictor, walks = fitted(name)
+    for walk in walks[:6]:
+        stream = predictor.stream(walk)
+        rows = predictor.predict_proba([walk.first(count) for count in range(walk.num_states + 1)])
+        beliefs = [stream.belief] + [
+            stream.update(state, float(time)) for state, time in zip(walk.states, walk.times, strict=True)
+        ]
+        columns = [predictor.classes_.tolist().index(goal) for goal in walk.candidates]
+        np.testing.assert_allclose([list(belief.values()) for belief in beliefs], rows[:, columns], atol=1e-9)
+        assert all(tuple(belief) == walk.candidates for belief in beliefs)
+        assert (stream.num_states, stream.last_time) == (walk.num_states, walk.times[-1])
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_the_future_changes_nothing(name: str) -> None:
+    """The belief after t states is the same whatever comes after them, goal and whole length included."""
+    predictor, walks = fitted(name)
+    for walk in walks[:6]:
+        half = walk.num_states // 2
+        back = np.concatenate([walk.states[:half], walk.states[:half][::-1]])
+        other = Trajectory(
+            back,
+            start=walk.start,
+            candidates=walk.candidates,
+            layout=walk.layout,
+            goal_positions=walk.goal_positions,
+            complete=False,
+        )
+        timed = Trajectory(
+            walk.states,
+            start=walk.start,
+            candidates=walk.candidates,
+            layout=walk.layout,
+            goal_positions=walk.goal_positions,
+            complete=False,
+        )
+        for count in range(half + 1):
+            expected = predictor.predict_proba([timed.first(count)])
+            np.testing.assert_allclose(predictor.predict_proba([other.first(count)]), expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_only_candidates_are_possible(name: str) -> None:
+    predictor, walks = fitted(name)
+    few = [walk for walk in walks if len(walk.candidates) < len(predictor.classes_)]
+    assert few
+    prefixes = [walk.first(count) for walk in few for count in range(walk.num_states + 1)]
+    rows = predictor.predict_proba(prefixes)
+    assert np.allclose(rows.sum(axis=1), 1)
+    for row, prefix in zip(rows, prefixes, strict=True):
+        assert {goal for goal, p in zip(predictor.classes_, row, strict=True) if p > 0} <= set(prefix.candidates)
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_nothing_observed_is_a_prior_that_the_start_and_states_do_not_change(name: str) -> None:
+    predictor, walks = fitted(name)
+    by_candidates: dict[frozenset[str], dict[str, float]] = {}
+    for walk in walks:
+        row = dict(zip(predictor.classes_.tolist(), predictor.predict_proba([walk.first(0)])[0], strict=True))
+        assert row == pytest.approx(by_candidates.setdefault(frozenset(walk.candidates), row), abs=1e-12)
+        assert predictor.stream(walk).belief == pytest.approx({goal: row[goal] for goal in walk.candidates})
+
+
+# -- when to act -------------------------------------------------------------------------------------------------------
+
+
+class Scripted(GoalPredictor):
+    """Believes what the states say: the probability of the first candidate is in the first coordinate."""
+
+    def predict_proba(self, X: Sequence[Trajectory]) -> npt.NDArray[np.float64]:
+        rows = np.zeros((len(X), len(self.classes_)))
+        for row, walk in zip(rows, X, strict=True):
+            first = walk.states[-1, 0] if walk.num_states else 0.5
+            row[self._columns(walk)] = first, 1 - first
+        return rows
+
+
+def scripted(values: Sequence[float], goal: str | None = "a") -> Trajectory:
+    times = 10 + 0.5 * np.arange(len(values))
+    return Trajectory(np.array(values, dtype=float)[:, None], times, goal=goal, candidates=("a", "b"), participant="p")
+
+
+def test_decides_at_the_threshold_and_stays() -> None:
+    walk = scripted([0.5, 0.7, 0.8, 0.1, 0.0])
+    watcher = ThresholdDecision(Scripted().fit([walk]), 0.8).stream(walk)
+    assert watcher.belief == {"a": 0.5, "b": 0.5}
+    assert watcher.update([0.5], 10.0) is None
+    assert watcher.update([0.7], 10.5) is None
+    decision = watcher.update([0.8], 11.0)
+    assert decision == Decision("a", 0.8, 3, 11.0)
+    assert watcher.update([0.1], 11.5) is decision
+    assert watcher.decision is decision
+    assert watcher.belief == pytest.approx({"a": 0.1, "b": 0.9})
+
+
+def test_patience_wants_the_same_goal_in_a_row() -> None:
+    walk = scripted([0.9, 0.1, 0.1, 0.5, 0.9, 0.9, 0.9, 0.9])
+    predictor = Scripted().fit([walk])
+    steps = [ThresholdDecision(predictor, 0.8, patience=n).decide([walk])["step"].item() for n in (1, 2, 3, 4)]
+    assert steps == [1, 3, 7, 0]  # the last state is the goal's own and not shown
+    assert ThresholdDecision(predictor, 0.8, patience=2).decide([walk])["decision"].item() == "b"
+
+
+def test_ties_decide_nothing() -> None:
+    walk = scripted([0.5, 0.5, 0.5])
+    assert not ThresholdDecision(Scripted().fit([walk]), 0.3).decide([walk])["decided"].any()
+
+
+def test_rows_say_when_and_whether_rightly() -> None:
+    walks = [scripted([0.6, 0.9, 1, 1]), scripted([0.1, 1, 1, 1]), scripted([0.5] * 4), scripted([0.9, 0.9], None)]
+    rule = ThresholdDecision(Scripted().fit(walks), 0.85)
+    rows = rule.decide(walks)
+    assert rows["decision"].tolist() == ["a", "b", "", "a"]
+    assert rows["step"].tolist() == [2, 1, 0, 1]
+    assert rows["correct"].tolist()[:3] == [1, 0, 0]
+    assert math.isnan(rows["correct"].iloc[3])
+    assert rows["fraction"].tolist()[:2] == [0.5, 0.25]
+    assert rows["time"].tolist()[:2] == [0.5, 0.0]
+    assert rows["lead"].tolist()[:2] == [1.0, 1.5]
+    assert rows.loc[2, ["fraction", "time", "lead", "probability"]].isna().all()
+    summary = summarise_decisions(rows[:3])
+    expected = {"threshold": 0.85, "trajectories": 3, "decided": 2 / 3, "correct": 1 / 3, "precision": 0.5}
+    assert summary.loc[0, list(expected)].to_dict() == pytest.approx(expected)
+    assert summary.loc[0, ["fraction", "lead"]].tolist() == [0.375, 1.25]
+    prefix = Trajectory([[0.9]], goal="a", candidates=("a", "b"), complete=False)
+    assert rule.decide([prefix])["step"].item() == 1  # all of a prefix is shown
+    assert rule.decide([]).empty
+    assert list(rule.decide([]).columns) == list(rows.columns)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    values=st.lists(st.sampled_from([0.0, 0.2, 0.5, 0.75, 0.9, 1.0]), min_size=1, max_size=8),
+    threshold=st.sampled_from([0.3, 0.6, 0.75, 0.9, 1.0]),
+    patience=st.integers(1, 3),
+)
+def test_whole_trajectories_are_streams(values: list[float], threshold: float, patience: int) -> None:
+    walk = scripted(values)
+    rule = ThresholdDecision(Scripted().fit([walk]), threshold, patience=patience)
+    watcher = rule.stream(walk)
+    for state, time in zip(walk.states[:-1], walk.times[:-1], strict=True):
+        watcher.update(state, float(time))
+    row = rule.decide([walk]).iloc[0]
+    if watcher.decision is None:
+        assert not row["decided"]
+    else:
+        found = (row["decision"], row["probability"], row["step"], row["time"] + 10)
+        assert found == (*[getattr(watcher.decision, f) for f in ("goal", "probability", "step", "time")],)
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_every_predictor_can_decide(name: str) -> None:
+    predictor, walks = fitted(name)
+    thresholds = [0.4, 0.6, 0.9, 1.0]
+    rows = ThresholdDecision(predictor).trade_off(walks, thresholds)
+    assert len(rows) == len(walks) * len(thresholds)
+    steps = rows["step"].where(rows["decided"], 10**6).to_numpy().reshape(len(thresholds), -1)
+    assert (np.diff(steps, axis=0) >= 0).all()  # surer is later
+    summary = summarise_decisions(rows)
+    assert summary["threshold"].tolist() == thresholds
+    rule, walk = ThresholdDecision(predictor, 0.6), walks[0]
+    watcher = rule.stream(walk)
+    for state, time in zip(walk.states[:-1], walk.times[:-1], strict=True):
+        watcher.update(state, float(time))
+    step = rule.decide([walk])["step"].item()
+    assert step == (0 if watcher.decision is None else watcher.decision.step)
+
+
+def test_standing_still_is_no_evidence_for_patience() -> None:
+    walk = example_walks()[0]
+    predictor = BayesianGoalPredictor(beta=5.0).fit([walk])
+    watcher = ThresholdDecision(predictor, 0.9, patience=2).stream(walk)
+    for cell in ((3, 2), (2, 2), (1, 2), (1, 1), (1, 1), (1, 1)):
+        assert watcher.update(cell) is None
+    assert watcher.update((0, 1)) is not None
+
+
+def test_bad_rules_and_points() -> None:
+    walk = example_walks()[0]
+    predictor = ShortestDistance().fit([walk])
+    for threshold in (0, 1.1, math.nan, True, "high"):
+        with pytest.raises(ValueError, match="a threshold must be above 0 and at most 1"):
+            ThresholdDecision(predictor, threshold)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="`patience`"):
+        ThresholdDecision(predictor, patience=0)
+    with pytest.raises(TypeError, match="must be a GoalPredictor"):
+        ThresholdDecision("shortest-distance")  # type: ignore[arg-type]
+    watcher = ThresholdDecision(predictor).stream(walk)
+    with pytest.raises(ValueError, match="finite point"):
+        watcher.update((np.nan, 1.0))
+    with pytest.raises(TypeError, match="put it in a list"):
+        ThresholdDecision(predictor).decide(walk)  # type: ignore[arg-type]
