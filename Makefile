@@ -13,7 +13,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 LOCKED := requirements/constraints.txt
 EXAMPLE := docs/examples/legible-emitter-example
 
-.PHONY: help demo test lint format bench lock clean
+.PHONY: help demo test test-benchmarks lint format bench lock clean
 .DEFAULT_GOAL := help
 
 help:
@@ -42,6 +42,10 @@ demo: $(VENV)/.run-installed
 test: $(VENV)/.test-installed
 	-$(BIN)/legible humans fetch
 	$(BIN)/python -m pytest $(PYTEST_ARGS)
+
+# make test-benchmarks   the tests that take minutes each
+test-benchmarks: $(VENV)/.test-installed
+	$(BIN)/python -m pytest -m benchmark
 
 # make lint   style, formatting and types
 lint: $(VENV)/.test-installed

@@ -260,7 +260,12 @@ def test_candidates_alone_are_possible(on_cells: NeuralPredictor) -> None:
 @pytest.mark.timeout(1200)
 @pytest.mark.parametrize(
     ("layout", "known"),
-    [("asymmetric_advantages", 0.935), ("coordination_ring", 0.439), ("cramped_room", 0.676), ("random3", 0.488)],
+    [
+        pytest.param("asymmetric_advantages", 0.935, marks=pytest.mark.benchmark),
+        pytest.param("coordination_ring", 0.439, marks=pytest.mark.benchmark),
+        ("cramped_room", 0.676),
+        pytest.param("random3", 0.488, marks=pytest.mark.benchmark),
+    ],
 )
 def test_reads_recorded_people_as_well_as_a_gru_did_before(layout: str, known: float) -> None:
     try:
@@ -275,6 +280,7 @@ def test_reads_recorded_people_as_well_as_a_gru_did_before(layout: str, known: f
 
 
 @pytest.mark.slow
+@pytest.mark.benchmark
 @pytest.mark.timeout(1200)
 @needs_pointing
 def test_reads_real_pointing_as_well_as_a_gru_did_before() -> None:
