@@ -350,6 +350,15 @@ def test_history_of_a_long_search_stays_short():
 # -- stopping by hand --------------------------------------------------------------------------------------------------
 
 
+@pytest.fixture
+def ctrl_c_interrupts():
+    """Jobs in the background of a shell ignore Ctrl-C, and so do their children: there it would test nothing."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("ctrl_c_interrupts")
 def test_ctrl_c_finishes_the_batch_saves_and_brings_the_result(tmp_path):
     def press(state):
         if state.iteration == 3:
@@ -369,6 +378,7 @@ def test_ctrl_c_finishes_the_batch_saves_and_brings_the_result(tmp_path):
     assert same_archive(whole.archive, search(SHELF, evaluations=100_000).archive)
 
 
+@pytest.mark.usefixtures("ctrl_c_interrupts")
 def test_ctrl_c_from_outside_leaves_a_usable_run(tmp_path):
     program = textwrap.dedent("""
         import sys
@@ -387,7 +397,10 @@ def test_ctrl_c_from_outside_leaves_a_usable_run(tmp_path):
     )
     assert child.stdout.readline() == "running\n"
     child.send_signal(signal.SIGINT)
-    _, errors = child.communicate(timeout=60)
+    try:
+        _, errors = child.communicate(timeout=60)
+    finally:
+        child.kill()
     assert child.returncode != 0
     assert "SearchInterrupted: interrupted after" in errors
     run = load_run(tmp_path)
