@@ -32,7 +32,7 @@ $(VENV)/.run-installed: $(LOCKED) pyproject.toml | $(BIN)/python
 $(VENV)/.test-installed: $(LOCKED) pyproject.toml | $(BIN)/python
 	@echo "Installing the test environment into $(VENV) (pinned versions) ..."
 	$(if $(TORCH),$(PIP) $(TORCH))
-	$(PIP) -c $(LOCKED) -e '.[dev,minari]'
+	$(PIP) -c $(LOCKED) -e '.[dev,distributed,docs,minari]'
 	$(PIP) -c $(LOCKED) --no-deps -e $(EXAMPLE)
 	@touch $@ $(VENV)/.run-installed
 
