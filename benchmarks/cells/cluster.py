@@ -1,0 +1,110 @@
+"""Cells on a Dask cluster."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+from benchmarks.cells.running import Outcome, run_one
+from benchmarks.cells.store import Cell
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+__all__ = ["ClusterPool", "connect"]
+
+_POLL = 0.5
+"""Seconds after which progress per worker is asked for again."""
+
+
+def connect(scheduler: str, timeout: float = 10.0) -> Client:
+    """A client of a running scheduler.
+
+    Raises:
+        ImportError: Dask is not installed; the message says how to get it.
+        ConnectionError: Nobody answers at that address.
+    """
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise ImportError("a cluster needs Dask: pip install 'legible-envs[distributed]'") from error
+    try:
+        return Client(scheduler, timeout=timeout, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise ConnectionError(
+            f"no Dask scheduler answers at {scheduler!r} ({error}); start one with `dask scheduler` and workers with "
+            "`dask worker ADDRESS`"
+        ) from error
+
+
+def run_here(function: str, number: int, cell: Cell) -> Outcome:
+    """One attempt, on a worker of a cluster."""
+    from distributed import get_worker
+
+    return run_one(function, number, cell, str(get_worker().address))
+
+
+class ClusterPool:
+    """Runs cells on the workers of a Dask scheduler, two per thread in flight.
+
+    A lost worker's cells are run elsewhere; results come back to this process, the only one that writes.
+
+    Args:
+        scheduler: Its address.
+    """
+
+    def __init__(self, scheduler: str) -> None:
+        self._client = connect(scheduler)
+        self._queue: deque[tuple[int, Cell]] = deque()
+
+    def run(self, function: str, cells: Iterator[tuple[int, Cell]]) -> Iterator[Outcome | dict[str, Cell]]:
+        """See :class:`~benchmarks.cells.running.Pool`."""
+        from distributed import wait
+
+        self._queue.extend(cells)
+        running: dict[Any, tuple[int, Cell]] = {}
+        try:
+            while self._queue or running:
+                self._submit(function, running)
+                try:
+                    with self._client.as_current():
+                        ended = wait(list(running), timeout=_POLL, return_when="FIRST_COMPLETED").done
+                except TimeoutError:
+                    ended = set()
+                yield self._working(running)
+                for future in sorted(ended, key=lambda f: running[f][0]):
+                    number, _ = running.pop(future)
+                    yield _outcome(future, number)
+            yield {}
+        finally:
+            self._client.cancel(list(running))
+            self._client.close()
+
+    def again(self, number: int, cell: Cell) -> None:
+        """See :class:`~benchmarks.cells.running.Pool`."""
+        self._queue.append((number, cell))
+
+    def _submit(self, function: str, running: dict[Any, tuple[int, Cell]]) -> None:
+        """Keep every thread busy, but no more: what is not submitted cannot be lost, nor stuck behind a slow worker."""
+        room = max(1, 2 * sum(self._client.nthreads().values())) - len(running)
+        while self._queue and room > 0:
+            number, cell = self._queue.popleft()
+            running[self._client.submit(run_here, function, number, dict(cell), pure=False)] = (number, cell)
+            room -= 1
+
+    def _working(self, running: dict[Any, tuple[int, Cell]]) -> dict[str, Cell]:
+        """What each worker is at: the first cell it was given and has not ended."""
+        cells = {future.key: cell for future, (_, cell) in running.items()}
+        return {
+            worker: next(cells[key] for key in keys if key in cells)
+            for worker, keys in self._client.processing().items()
+            if any(key in cells for key in keys)
+        }
+
+
+def _outcome(future: Any, number: int) -> Outcome:
+    if future.status == "finished":
+        return future.result()
+    error = future.exception() if future.status == "error" else None
+    return Outcome(number, None, f"the worker was lost: {error or future.status}", 0.0, "")
