@@ -130,4 +130,5 @@ def walks_in(kitchen: Kitchen, trajectories: Path) -> list[Trajectory]:
 
 def _same_cells(walk: Trajectory, kitchen: Kitchen) -> bool:
     """Whether a walk was recorded in this kitchen, wherever players started."""
-    return walk.layout is not None and bool(np.array_equal(walk.layout.cells, kitchen.layout.cells))
+    cells = getattr(walk.layout, "cells", None)  # a table has none
+    return cells is not None and bool(np.array_equal(cells, kitchen.layout.cells))

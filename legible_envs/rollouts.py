@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from legible_envs.overcooked.layout import OvercookedLayout
+    from legible_envs.tabletop.layout import TabletopLayout
 
 __all__ = ["CUTS", "Cut", "Trajectory", "load_trajectories", "save_trajectories", "trajectories_from_rollout"]
 
@@ -52,7 +53,7 @@ class Trajectory:
         candidates: Goals that were possible, each once; the order does not matter and is kept.
         participant: Who.
         condition: Under which condition.
-        layout: The kitchen it happened in, if any.
+        layout: The kitchen or the table it happened at, if any.
         layout_name: Its name, if it has one.
         candidate_set: Where ``candidates`` come from: valid by precedence (``"task"``), valid in the running game
             (``"game"``), or all goals of that kind in reach (``"all"``).
@@ -76,7 +77,7 @@ class Trajectory:
     candidates: tuple[str, ...] = ()
     participant: str = ""
     condition: str = ""
-    layout: OvercookedLayout | None = None
+    layout: OvercookedLayout | TabletopLayout | None = None
     layout_name: str = ""
     candidate_set: CandidateSet = "all"
     complete: bool = True

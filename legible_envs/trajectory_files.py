@@ -6,10 +6,10 @@
 ``states``     ``(N, d)`` all states end to end, integers (cells) or floats (positions)
 ``times``      ``(N,)`` their times
 ``offsets``    ``(n+1,)`` trajectory ``i`` is rows ``offsets[i]:offsets[i+1]``
-``records``    JSON as ASCII bytes (uint8): ``layouts`` (``kind`` and ``text`` each) and, per trajectory,
-               ``trajectories`` (``start goal candidates participant condition layout layout_name candidate_set
-               complete``, ``layout`` being a number in ``layouts`` or null; since schema 2 also
-               ``goal_positions``, where they are known)
+``records``    JSON as ASCII bytes (uint8): ``layouts`` (``kind`` and ``text`` each: ``"overcooked"`` and its drawing
+               or, since schema 3, ``"tabletop"`` and its JSON) and, per trajectory, ``trajectories`` (``start goal
+               candidates participant condition layout layout_name candidate_set complete``, ``layout`` being a number
+               in ``layouts`` or null; since schema 2 also ``goal_positions``, where they are known)
 =============  ========================================================================================================
 """
 
@@ -18,7 +18,7 @@ from __future__ import annotations
 import json
 import os
 import zipfile
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, Final
 
@@ -27,13 +27,17 @@ import numpy as np
 from legible_envs.files import write_npz
 from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.rollouts import Trajectory
+from legible_envs.tabletop.layout import TabletopLayout
 
 __all__ = ["SCHEMA", "read", "write"]
 
-SCHEMA: Final = 2
+SCHEMA: Final = 3
 _KIND: Final = "legible-envs trajectories"
 _TEXTS: Final = ("start", "goal", "candidates", "participant", "condition", "layout_name", "candidate_set", "complete")
-_LAYOUT_READERS: Final = {"overcooked": OvercookedLayout.from_ascii}
+_LAYOUT_READERS: Final[dict[str, Callable[[str], Any]]] = {
+    "overcooked": OvercookedLayout.from_ascii,
+    "tabletop": TabletopLayout.from_json,
+}
 
 
 def write(path: str | os.PathLike[str], trajectories: Iterable[Trajectory]) -> Path:
@@ -54,7 +58,7 @@ def write(path: str | os.PathLike[str], trajectories: Iterable[Trajectory]) -> P
             record["goal_positions"] = walk.goal_positions
         records.append(record)
     content = {
-        "layouts": [{"kind": "overcooked", "text": layout.to_ascii()} for layout in layouts],
+        "layouts": [_described(layout) for layout in layouts],
         "trajectories": records,
     }
     states = [np.zeros((0, dimension), dtype=dtype), *(walk.states for walk in walks if walk.num_states)]
@@ -62,8 +66,7 @@ def write(path: str | os.PathLike[str], trajectories: Iterable[Trajectory]) -> P
         path,
         {
             "kind": _KIND,
-            # Files that use nothing new stay readable by older versions.
-            "schema": SCHEMA if any("goal_positions" in record for record in records) else 1,
+            "schema": _least_schema(layouts, records),
             "states": np.concatenate(states),
             "times": np.concatenate([np.zeros(0), *(walk.times for walk in walks)]),
             "offsets": np.cumsum([0, *(walk.num_states for walk in walks)], dtype=np.int64),
@@ -71,6 +74,19 @@ def write(path: str | os.PathLike[str], trajectories: Iterable[Trajectory]) -> P
         },
     )
     return Path(path)
+
+
+def _described(layout: OvercookedLayout | TabletopLayout) -> dict[str, str]:
+    if isinstance(layout, TabletopLayout):
+        return {"kind": "tabletop", "text": layout.to_json()}
+    return {"kind": "overcooked", "text": layout.to_ascii()}
+
+
+def _least_schema(layouts: Iterable[Any], records: Iterable[dict[str, Any]]) -> int:
+    """Files that use nothing new stay readable by older versions."""
+    if any(isinstance(layout, TabletopLayout) for layout in layouts):
+        return 3
+    return 2 if any("goal_positions" in record for record in records) else 1
 
 
 def read(path: str | os.PathLike[str]) -> list[Trajectory]:
@@ -92,6 +108,9 @@ def read(path: str | os.PathLike[str]) -> list[Trajectory]:
 
 def _rebuild(states: Any, times: Any, offsets: Any, records: Any) -> list[Trajectory]:
     content = json.loads(records.tobytes().decode("ascii"))
+    unknown = sorted({str(entry["kind"]) for entry in content["layouts"]} - _LAYOUT_READERS.keys())
+    if unknown:
+        raise ValueError(f"it has layouts of the kinds {unknown}; this version reads {list(_LAYOUT_READERS)}")
     layouts = [_LAYOUT_READERS[entry["kind"]](entry["text"]) for entry in content["layouts"]]
     found = content["trajectories"]
     if len(offsets) != len(found) + 1 or offsets[0] != 0 or offsets[-1] != len(states) or (np.diff(offsets) < 0).any():

@@ -19,8 +19,10 @@ from legible_envs.overcooked.policies import ScriptedPlayer
 from legible_envs.overcooked.walks import record_episode
 from legible_envs.rollouts import Trajectory, save_trajectories
 from legible_envs.rollouts_io import RecordRollouts, read_any, read_csv, to_minari, trajectories_from_played, write_csv
+from legible_envs.tabletop import TableObject, TabletopLayout, VirtualObstacle
 
 KITCHEN = OvercookedLayout.from_ascii("XOXTX\nX   X\nX   D\nX 1 X\nXXSPX")
+TABLE = TabletopLayout([TableObject("a cup, red", (0.1 + 0.2, 0.5))], [VirtualObstacle((0.4, 0.2), 1 / 3)])
 NAMES = st.text(
     st.characters(exclude_characters=";\x00\r\n", exclude_categories=["Cs", "Cc", "Zs"]), min_size=1, max_size=5
 )
@@ -40,7 +42,7 @@ def trajectories(draw: st.DrawFn, grid: bool) -> Trajectory:
         candidates=tuple(names),
         participant=draw(st.sampled_from(["", "p1", "Zoë"])),
         condition=draw(st.sampled_from(["", "legible"])),
-        layout=draw(st.sampled_from([None, KITCHEN])),
+        layout=draw(st.sampled_from([None, KITCHEN, TABLE])),
         layout_name=draw(st.sampled_from(["", "home, sweet"])),
         candidate_set=draw(st.sampled_from(["task", "game", "all"])),
         complete=draw(st.booleans()),

@@ -25,12 +25,17 @@ from legible_envs.rollouts import (
     save_trajectories,
     trajectories_from_rollout,
 )
+from legible_envs.tabletop import Table, TableObject, TabletopLayout, VirtualObstacle
 
 assert legible_envs
 
 KITCHENS = [
     OvercookedLayout.from_ascii("XOXTX\nX   X\nD   P\nXXSXX"),
     OvercookedLayout.from_ascii("XXPXX\nO  2O\nX1  X\nXDXSX"),
+]
+TABLES = [
+    TabletopLayout([TableObject("cup", (0.1 + 0.2, 0.5)), TableObject("Löffel", (0.6, 1 / 3), size=(0.1, 0.02))]),
+    TabletopLayout([TableObject("cup", (0.3, 0.5))], [VirtualObstacle((0.4, 0.2), 0.3)], Table(hand=0.03)),
 ]
 TEXT = st.text(max_size=5)
 NAMES = st.lists(st.text(min_size=1, max_size=5), min_size=1, max_size=4, unique=True)
@@ -50,7 +55,7 @@ def walks(draw: st.DrawFn, grid: bool) -> Trajectory:
         candidates=candidates,
         participant=draw(TEXT),
         condition=draw(TEXT),
-        layout=draw(st.none() | st.sampled_from(KITCHENS)),
+        layout=draw(st.none() | st.sampled_from([*KITCHENS, *TABLES])),
         layout_name=draw(TEXT),
         candidate_set=draw(st.sampled_from(["task", "game", "all"])),
         complete=draw(st.booleans()),
@@ -87,6 +92,27 @@ def test_files_hold_no_pickles_and_say_what_they_are(tmp_path: Path) -> None:
         assert int(file["schema"]) == 1
         records = json.loads(file["records"].tobytes())
     assert records["trajectories"][0]["candidates"] == ["a", "b"]
+
+
+def test_files_need_no_newer_version_than_what_is_in_them(tmp_path: Path) -> None:
+    walk = reach([(0.1, 0.1), (0.3, 0.5)])
+    at = {"goal_positions": ((0.3, 0.5), (0.5, 0.5))}
+    for schema, options in ((1, {}), (1, {"layout": KITCHENS[0]}), (2, at), (3, {"layout": TABLES[1], **at})):
+        found = [reach(walk.states, **options), walk]
+        save_trajectories(tmp_path / "w.npz", found)
+        assert load_trajectories(tmp_path / "w.npz") == found
+        with np.load(tmp_path / "w.npz", allow_pickle=False) as file:
+            assert int(file["schema"]) == schema
+
+
+def test_a_layout_of_an_unknown_kind_is_named(tmp_path: Path) -> None:
+    save_trajectories(tmp_path / "w.npz", [reach([(0.1, 0.1)], layout=TABLES[0])])
+    with np.load(tmp_path / "w.npz") as file:
+        arrays = dict(file)
+    records = arrays["records"].tobytes().replace(b'"kind": "tabletop"', b'"kind": "seesaw"')
+    np.savez(tmp_path / "w.npz", **{**arrays, "records": np.frombuffer(records, dtype=np.uint8)})
+    with pytest.raises(ValueError, match=r"kinds \['seesaw'\]; this version reads \['overcooked', 'tabletop'\]"):
+        load_trajectories(tmp_path / "w.npz")
 
 
 def test_unreadable_files_are_refused_in_words(tmp_path: Path) -> None:

@@ -160,8 +160,8 @@ def _collect(walks: Sequence[Trajectory], names: Sequence[str], cell_costs: npt.
     ways: dict[tuple[object, str], Way] = {}
     excess, taken, who = [], [], []
     for number, walk in enumerate(walks):
-        if walk.layout is None or walk.goal is None or not walk.is_grid:
-            raise ValueError(f"walk {number} has no layout, no goal, or positions instead of cells")
+        if not isinstance(walk.layout, OvercookedLayout) or walk.goal is None or not walk.is_grid:
+            raise ValueError(f"walk {number} has no kitchen, no goal, or positions instead of cells")
         key = walk.layout, walk.goal
         if key not in ways:
             ways[key] = make_way(walk.layout, walk.layout.stations[walk.goal], cell_costs)

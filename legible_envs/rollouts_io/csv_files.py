@@ -10,8 +10,8 @@
 ``start``          where the person came from (optional, as all that follow)
 ``participant``    who
 ``condition``      under which condition
-``layout_name``    name of the kitchen
-``layout``         its drawing, ``/`` between rows
+``layout_name``    name of the kitchen or table
+``layout``         the kitchen's drawing, ``/`` between rows; or the table as JSON
 ``candidate_set``  ``task``, ``game`` or ``all``
 ``positions``      where each of ``candidates`` is: coordinates with blanks, ``;`` between goals
 ``complete``       ``1``, or ``0`` for a prefix
@@ -24,6 +24,7 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 import os
 from collections.abc import Iterable
 from functools import lru_cache
@@ -35,6 +36,7 @@ import numpy as np
 from legible_envs.files import write_atomically
 from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.rollouts import Trajectory
+from legible_envs.tabletop.layout import TabletopLayout
 
 __all__ = ["read_csv", "write_csv"]
 
@@ -83,16 +85,20 @@ def write_csv(path: str | os.PathLike[str], trajectories: Iterable[Trajectory]) 
     return target
 
 
-def _drawing(layout: OvercookedLayout | None) -> str:
+def _drawing(layout: OvercookedLayout | TabletopLayout | None) -> str:
+    if isinstance(layout, TabletopLayout):
+        return json.dumps(layout.to_dict(), separators=(",", ":"))
     return "" if layout is None else "/".join(layout.to_ascii().splitlines())
 
 
-def read_csv(path: str | os.PathLike[str], *, layout: OvercookedLayout | None = None) -> list[Trajectory]:
+def read_csv(
+    path: str | os.PathLike[str], *, layout: OvercookedLayout | TabletopLayout | None = None
+) -> list[Trajectory]:
     """Read trajectories from CSV; see the module for the columns.
 
     Args:
         path: The file.
-        layout: Kitchen of the trajectories whose rows name none.
+        layout: Kitchen or table of the trajectories whose rows name none.
 
     Raises:
         FileNotFoundError: No such file.
@@ -193,5 +199,7 @@ def _number(line: int, row: dict[str, str], column: str, kind: type) -> Any:
 
 
 @lru_cache(maxsize=64)
-def _layout(drawn: str) -> OvercookedLayout:
+def _layout(drawn: str) -> OvercookedLayout | TabletopLayout:
+    if drawn.startswith("{"):
+        return TabletopLayout.from_json(drawn)
     return OvercookedLayout.from_ascii("\n".join(drawn.split("/")))

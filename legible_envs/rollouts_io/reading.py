@@ -10,16 +10,19 @@ from legible_envs.rollouts import Trajectory, load_trajectories
 
 if TYPE_CHECKING:
     from legible_envs.overcooked.layout import OvercookedLayout
+    from legible_envs.tabletop.layout import TabletopLayout
 
 __all__ = ["read_any"]
 
 
-def read_any(path: str | os.PathLike[str], *, layout: OvercookedLayout | None = None) -> list[Trajectory]:
+def read_any(
+    path: str | os.PathLike[str], *, layout: OvercookedLayout | TabletopLayout | None = None
+) -> list[Trajectory]:
     """Trajectories of an ``.npz`` of :func:`~legible_envs.rollouts.save_trajectories`, a CSV, or a recorded play.
 
     Args:
         path: The file; ``.csv`` is read as CSV, others by what is in them.
-        layout: Kitchen of CSV trajectories that name none.
+        layout: Kitchen or table of CSV trajectories that name none.
 
     Raises:
         OSError: The file cannot be read.

@@ -53,6 +53,8 @@ def check_walk(walk: Trajectory) -> OvercookedLayout:
     layout = walk.layout
     if layout is None:
         raise ValueError("this predictor needs the layout of a trajectory; this one has none")
+    if not isinstance(layout, OvercookedLayout):
+        raise ValueError(f"this predictor reads walks in kitchens; this trajectory has a {type(layout).__name__}")
     if walk.num_states and (not walk.is_grid or walk.states.shape[1] != 2):
         raise ValueError(f"expected (row, col) cells, got {walk.states.shape[1]}-d {walk.states.dtype} states")
     last = walk.num_states - 1

@@ -62,7 +62,7 @@ class PrefixEncoder:
 
 
 def _layout_of(walk: Trajectory) -> OvercookedLayout:
-    assert walk.layout is not None
+    assert isinstance(walk.layout, OvercookedLayout)
     return walk.layout
 
 

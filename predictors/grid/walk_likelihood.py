@@ -77,7 +77,7 @@ def collect_evidence(walks: Sequence[Trajectory]) -> dict[OvercookedLayout, Evid
     """Sum up complete walks, which must fit their layouts, per kitchen."""
     groups: dict[OvercookedLayout, list[Trajectory]] = {}
     for walk in walks:
-        assert walk.layout is not None
+        assert isinstance(walk.layout, OvercookedLayout)
         groups.setdefault(walk.layout, []).append(walk)
     return {layout: _sum_up(layout, members) for layout, members in groups.items()}
 
