@@ -274,7 +274,7 @@ class OvercookedEnv(JsonSpec, gym.Env[npt.NDArray[Any], Any]):
         if self.render_mode == "rgb_array":
             return picture
         if self._window is None:
-            from legible_envs.overcooked.window import Window
+            from legible_envs.drawing.window import Window
 
             self._window = Window("Legible kitchen", fps=self.metadata["render_fps"])
         self._window.show(picture)

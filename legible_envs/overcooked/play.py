@@ -291,7 +291,7 @@ class _Table:
         return walking[-1] if walking else STAY
 
     def _draw(self, lines: Sequence[str] = ()) -> None:
-        from legible_envs.overcooked.rendering.sheets import overlay
+        from legible_envs.drawing.sheets import overlay
 
         picture: Any = self._env.render()
         if lines:

@@ -202,7 +202,7 @@ class OvercookedVectorEnv(JsonSpec, VectorEnv[npt.NDArray[Any], npt.NDArray[Any]
         if self.render_mode == "rgb_array":
             return tuple(draw_game(view) for view in views)
         if self.render_mode == "human":
-            from legible_envs.overcooked.window import Window
+            from legible_envs.drawing.window import Window
 
             if self._window is None:
                 self._window = Window("Legible kitchens", fps=self.metadata["render_fps"])

@@ -23,7 +23,7 @@ from predictors.grid.walk_likelihood import (
 )
 
 if TYPE_CHECKING:
-    from legible_envs.overcooked.rendering.canvas import Image
+    from legible_envs.drawing.canvas import Image
 
 __all__ = ["MaxEntIRL"]
 

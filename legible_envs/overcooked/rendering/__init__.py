@@ -14,12 +14,12 @@ Example:
     (160, 160, 3)
 """
 
+from legible_envs.drawing.canvas import load_pygame
+from legible_envs.drawing.sheets import draw_side_by_side, save_png
 from legible_envs.overcooked.rendering.ambiguity import draw_ambiguity
 from legible_envs.overcooked.rendering.board import draw_game, draw_layout
-from legible_envs.overcooked.rendering.canvas import load_pygame
 from legible_envs.overcooked.rendering.hud import hud_height
 from legible_envs.overcooked.rendering.palette import HEAT, PALETTE, PLAYER_COLOURS
-from legible_envs.overcooked.rendering.sheets import draw_side_by_side, save_png
 
 __all__ = [
     "HEAT",

@@ -6,7 +6,7 @@ import math
 from functools import lru_cache
 from typing import Final
 
-from legible_envs.overcooked.rendering.canvas import Canvas, Sprite, mix
+from legible_envs.drawing.canvas import Canvas, Sprite, mix
 from legible_envs.overcooked.rendering.food import draw_item, draw_pieces, soup_colour
 from legible_envs.overcooked.rendering.palette import PALETTE, PLAYER_COLOURS
 from legible_envs.overcooked.rendering.tiles import COUNTER_TOP

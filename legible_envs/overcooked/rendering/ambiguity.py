@@ -10,11 +10,11 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from legible_envs.drawing.canvas import Canvas, Image, Sprite, mix, paste, rgb, text_sprite
+from legible_envs.drawing.sheets import banner, check_tile
 from legible_envs.overcooked.layout import Cell, OvercookedLayout
 from legible_envs.overcooked.rendering.board import board_of
-from legible_envs.overcooked.rendering.canvas import Canvas, Image, Sprite, mix, paste, rgb, text_sprite
 from legible_envs.overcooked.rendering.palette import HEAT, PALETTE, PLAYER_COLOURS
-from legible_envs.overcooked.rendering.sheets import banner, check_tile
 
 __all__ = ["draw_ambiguity"]
 

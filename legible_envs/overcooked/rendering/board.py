@@ -10,13 +10,13 @@ from typing import Final
 
 import numpy as np
 
+from legible_envs.drawing.canvas import Canvas, Image, Sprite, paste, rgb, text_sprite
+from legible_envs.drawing.sheets import banner, check_tile
 from legible_envs.overcooked.layout import FLOOR, OBSTACLE, STATION_CODES, Cell, OvercookedLayout
 from legible_envs.overcooked.rendering.actors import chef_sprite, pot_sprite
-from legible_envs.overcooked.rendering.canvas import Canvas, Image, Sprite, paste, rgb, text_sprite
 from legible_envs.overcooked.rendering.food import item_sprite
 from legible_envs.overcooked.rendering.hud import draw_hud, hud_height
 from legible_envs.overcooked.rendering.palette import PALETTE, PLAYER_COLOURS
-from legible_envs.overcooked.rendering.sheets import banner, check_tile
 from legible_envs.overcooked.rendering.tiles import tile_sprite
 from legible_envs.overcooked.view import GameView, PotView
 

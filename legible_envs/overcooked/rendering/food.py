@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Final
 
+from legible_envs.drawing.canvas import Canvas, Sprite, mix
 from legible_envs.overcooked.layout import INGREDIENTS
-from legible_envs.overcooked.rendering.canvas import Canvas, Sprite, mix
 from legible_envs.overcooked.rendering.palette import PALETTE
 from legible_envs.overcooked.view import Item
 

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from typing import Final
 
+from legible_envs.drawing.palette import HEAT, PAGE
+
 __all__ = ["HEAT", "PALETTE", "PLAYER_COLOURS"]
 
 PALETTE: Final[dict[str, str]] = {
+    **PAGE,
     "floor": "#f3e7d3",
     "floor_alternate": "#ebdcc4",
     "floor_line": "#dccaae",
@@ -15,9 +18,6 @@ PALETTE: Final[dict[str, str]] = {
     "counter_line": "#ae7c4b",
     "counter_front": "#8a5a34",
     "counter_dark": "#6b4326",
-    "obstacle": "#38d3e8",
-    "obstacle_light": "#a5f0f7",
-    "obstacle_edge": "#e23b3b",
     "tomato": "#e2483d",
     "onion": "#e8bf62",
     "cabbage": "#7fb84a",
@@ -41,14 +41,8 @@ PALETTE: Final[dict[str, str]] = {
     "hair": "#5b3a26",
     "cloth": "#fdfbf7",
     "cloth_shade": "#ddd6ca",
-    "ink": "#3a2d25",
-    "ink_soft": "#8a7868",
     "paper": "#fffaf0",
     "paper_line": "#e4d6bf",
-    "hud": "#4a3a30",
-    "hud_text": "#f8eedd",
-    "warning": "#ff8a7a",
-    "page": "#fbf6ec",
     "shadow": "#3a2415",
 }
 """Colours as ``#rrggbb`` by what they paint; stations and ingredients carry their own names."""
@@ -65,6 +59,3 @@ PLAYER_COLOURS: Final = (
     "#1f8fa8",
 )
 """Scarf and apron of each player, in the order of the players."""
-
-HEAT: Final = ("#fff4c2", "#fdd27a", "#f79d55", "#e2604f", "#b02e62", "#6b1d66")
-"""Ramp from 0 to 1, evenly spaced, steadily darker, told apart by colour-blind readers too."""

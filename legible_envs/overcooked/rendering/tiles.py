@@ -6,8 +6,8 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import Final
 
+from legible_envs.drawing.canvas import Canvas, Sprite, mix
 from legible_envs.overcooked.layout import COUNTER, FLOOR, OBSTACLE, STATION_TYPES
-from legible_envs.overcooked.rendering.canvas import Canvas, Sprite, mix
 from legible_envs.overcooked.rendering.food import draw_ingredient
 from legible_envs.overcooked.rendering.palette import PALETTE
 

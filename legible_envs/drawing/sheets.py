@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from legible_envs.drawing.canvas import Image, Sprite, paste, rgb, text_sprite
+from legible_envs.drawing.palette import PAGE
 from legible_envs.files import write_atomically
-from legible_envs.overcooked.rendering.canvas import Image, Sprite, paste, rgb, text_sprite
-from legible_envs.overcooked.rendering.palette import PALETTE
 
 __all__ = ["banner", "check_tile", "draw_side_by_side", "fit_text", "overlay", "save_png"]
 
@@ -40,10 +40,10 @@ def fit_text(text: str, size: int, colour: str, width: int) -> Sprite:
 def banner(image: Image, title: str, tile: int) -> Image:
     """The image with a title above it."""
     size = max(14, min(30, round(tile * 0.5)))
-    words = fit_text(title, size, PALETTE["ink"], image.shape[1] - 4)
+    words = fit_text(title, size, PAGE["ink"], image.shape[1] - 4)
     above = round(size * 1.35)
     framed = np.empty((image.shape[0] + above, *image.shape[1:]), np.uint8)
-    framed[:above] = rgb(PALETTE["page"])
+    framed[:above] = rgb(PAGE["page"])
     framed[above:] = image
     paste(framed, words, (above - words.colour.shape[0]) // 2 + 1, (image.shape[1] - words.colour.shape[1]) // 2)
     return framed
@@ -55,13 +55,13 @@ def overlay(image: Image, lines: Sequence[str], tile: int) -> Image:
     size = max(14, min(34, round(tile * 0.6)))
     room = image.shape[1] - size
     words = [
-        fit_text(line, size if number == 0 else round(size * 0.72), PALETTE["ink" if number == 0 else "ink_soft"], room)
+        fit_text(line, size if number == 0 else round(size * 0.72), PAGE["ink" if number == 0 else "ink_soft"], room)
         for number, line in enumerate(lines)
     ]
     tall = sum(len(line.colour) for line in words) + size
     top = max(0, (image.shape[0] - tall) // 2)
     left = max(0, (room - max(line.colour.shape[1] for line in words)) // 2)
-    dimmed[top : top + tall, left : image.shape[1] - left] = rgb(PALETTE["page"])
+    dimmed[top : top + tall, left : image.shape[1] - left] = rgb(PAGE["page"])
     row = top + size // 2
     for line in words:
         paste(dimmed, line, row, (image.shape[1] - line.colour.shape[1]) // 2)
@@ -106,8 +106,8 @@ def draw_side_by_side(
     cards = [
         _card(
             image,
-            [text_sprite(titles[i], text, PALETTE["ink"])] if titles else [],
-            [text_sprite(line, small, PALETTE["ink_soft"]) for line in captions[i].split("\n")] if captions else [],
+            [text_sprite(titles[i], text, PAGE["ink"])] if titles else [],
+            [text_sprite(line, small, PAGE["ink_soft"]) for line in captions[i].split("\n")] if captions else [],
             gap // 3,
         )
         for i, image in enumerate(images)
@@ -121,7 +121,7 @@ def _card(image: Image, above: Sequence[Sprite], below: Sequence[Sprite], space:
     foot = sum(len(line.colour) for line in below) + (space if below else 0)
     wide = max([image.shape[1], *(line.colour.shape[1] for line in (*above, *below))])
     card = np.empty((head + image.shape[0] + foot, wide, 3), np.uint8)
-    card[...] = rgb(PALETTE["page"])
+    card[...] = rgb(PAGE["page"])
     left = (wide - image.shape[1]) // 2
     card[head : head + image.shape[0], left : left + image.shape[1]] = image
     for row, lines in ((0, above), (head + image.shape[0] + space, below)):
@@ -136,7 +136,7 @@ def _grid(cards: Sequence[Image], columns: int, gap: int) -> Image:
     heights = [max(card.shape[0] for card in row) for row in rows]
     widths = [max(row[c].shape[1] for row in rows if c < len(row)) for c in range(len(rows[0]))]
     page = np.empty((sum(heights) + gap * (len(rows) + 1), sum(widths) + gap * (len(widths) + 1), 3), np.uint8)
-    page[...] = rgb(PALETTE["page"])
+    page[...] = rgb(PAGE["page"])
     top = gap
     for row, height in zip(rows, heights, strict=True):
         left = gap
