@@ -67,6 +67,11 @@ class ShortestPaths:
         rows = [(*o.at, o.angle, *o.size) for o in layout.obstacles]
         return cls(layout.centres, rows, layout.table.hand, layout.table.size, layout.goals)
 
+    @property
+    def tables(self) -> Floats:
+        """``(n, k)`` length of the shortest path from each of :attr:`corners` to every goal; not to be written to."""
+        return self._lengths
+
     def is_free(self, points: npt.ArrayLike) -> npt.NDArray[np.bool_]:
         """``(k,)`` whether the hand's centre may be at each of ``(k, 2)`` points."""
         return batch_free(self.boxes, self.size, _points(points, "points"))
