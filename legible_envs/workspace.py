@@ -18,6 +18,7 @@ import numpy.typing as npt
 from legible_envs.plugins import Registry
 
 if TYPE_CHECKING:
+    from legible_envs.rollouts import Trajectory
     from legible_envs.workspace_checks import check_workspace
 
 __all__ = ["Objective", "ObjectiveName", "Workspace", "check_workspace", "make_workspace", "register_workspace"]
@@ -191,6 +192,22 @@ class Workspace(ABC):
     def explain(self, genome: npt.ArrayLike) -> list[dict[str, Any]]:
         """Where one layout wins and loses its score: a row per stage and goal; plain data."""
 
+    def simulate(
+        self, genome: npt.ArrayLike, participants: int, rng: np.random.Generator, **settings: Any
+    ) -> list[Trajectory]:
+        """Reaches of simulated people in one layout, each doing the whole task; not every workspace has people.
+
+        Args:
+            genome: ``(d,)`` or a layout.
+            participants: Number of people.
+            rng: Source of all randomness.
+            **settings: Of the people, which the workspace names.
+
+        Raises:
+            NotImplementedError: This workspace has none.
+        """
+        raise NotImplementedError(f"{type(self).__name__} has no simulated people; its class can define `simulate`")
+
     # -- configuration ---------------------------------------------------------------------------------------------
 
     @abstractmethod
@@ -271,7 +288,10 @@ class Objective:
 _registry = Registry(
     "workspace",
     "legible.workspaces",
-    {"overcooked": "legible_envs.overcooked.workspace:OvercookedWorkspace"},
+    {
+        "overcooked": "legible_envs.overcooked.workspace:OvercookedWorkspace",
+        "tabletop": "legible_envs.tabletop.workspace:TabletopWorkspace",
+    },
     ValueError,
 )
 

@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from optimizers.cluster import ClusterObjective
+
 __all__ = ["Evaluator", "Objective"]
 
 Objective = Callable[[npt.NDArray[Any]], npt.NDArray[np.float64]]
@@ -27,13 +29,20 @@ class Evaluator:
             be maximised. NaN and negative infinity mean "not allowed": such a layout never enters an archive.
         max_distance: Layouts that make the person walk farther than this (floor moves, expected over one task
             execution) score NaN.
+        scheduler: Address of a Dask scheduler whose workers share the scoring; None scores in this process.
 
     Attributes:
         name: Name of the objective.
         seconds: Wall time spent in the objective so far (measures not included).
     """
 
-    def __init__(self, workspace: Any, objective: str | Objective = "legibility", max_distance: float | None = None):
+    def __init__(
+        self,
+        workspace: Any,
+        objective: str | Objective = "legibility",
+        max_distance: float | None = None,
+        scheduler: str | None = None,
+    ) -> None:
         self.workspace = workspace
         self.max_distance = max_distance
         self.seconds = 0.0
@@ -48,6 +57,12 @@ class Evaluator:
             self.max_distance = getattr(objective, "max_distance", None) if max_distance is None else max_distance
         else:
             raise TypeError(f"objective must be a name or a callable on genomes, got {type(objective).__name__}")
+        self._cluster = None if scheduler is None else ClusterObjective(self._score, scheduler)
+
+    def close(self) -> None:
+        """Leave the cluster, if there is one."""
+        if self._cluster is not None:
+            self._cluster.close()
 
     @property
     def score_floor(self) -> float:
@@ -68,7 +83,7 @@ class Evaluator:
             ValueError: The objective returned another shape, or positive infinity.
         """
         started = time.perf_counter()
-        scores = np.asarray(self._score(genomes), dtype=np.float64)
+        scores = np.asarray((self._cluster or self._score)(genomes), dtype=np.float64)
         if scores.shape != (len(genomes),):
             raise ValueError(
                 f"objective {self.name!r} must return one number per genome, shape ({len(genomes)},); "

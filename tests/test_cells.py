@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import cell_functions
@@ -15,7 +17,9 @@ import pandas as pd
 import pytest
 
 from benchmarks.cells import CellsFailed, CellStore, Event, run_cells
-from benchmarks.cells.cluster import connect
+from legible_envs.overcooked import OvercookedWorkspace
+from optimizers import search
+from optimizers.cluster import connect
 
 CELLS = [{"seed": seed, "settings": {"size": 3}, "shape": [7, 7]} for seed in range(5)]
 
@@ -133,51 +137,65 @@ def test_nobody_at_the_address_is_said() -> None:
         connect("tcp://127.0.0.1:1", timeout=0.5)
 
 
-@pytest.mark.slow
-@pytest.mark.skipif(sys.platform == "win32", reason="needs SIGKILL")
-def test_a_cluster_loses_a_worker_and_no_result(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
+    """Address of a scheduler with two workers, each a process of its own, and those processes."""
     pytest.importorskip("distributed")
-    cells = with_marks(tmp_path, 12, seconds=0.5)
-    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parent), "DASK_DISTRIBUTED__WORKER__DAEMON": "False"}
+    folder = tmp_path_factory.mktemp("cluster")
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parent)}
 
     def start(*arguments: str) -> subprocess.Popen[bytes]:
-        command = [sys.executable, "-m", "dask", *arguments]
+        command = [sys.executable, "-m", "dask", *arguments, "--host", "127.0.0.1", "--no-dashboard"]
         return subprocess.Popen(
-            command, env=environment, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+            command, env=environment, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
         )
 
-    scheduler_file = tmp_path / "scheduler.json"
-    local = ("--host", "127.0.0.1", "--no-dashboard")
-    processes = [start("scheduler", "--scheduler-file", str(scheduler_file), "--port", "0", *local)]
+    scheduler_file = folder / "scheduler.json"
+    processes = [start("scheduler", "--scheduler-file", str(scheduler_file), "--port", "0")]
     try:
         address = _address(scheduler_file)
-        one = ("--nthreads", "1", "--no-nanny", *local)
-        processes += [start("worker", address, *one), start("worker", address, *one)]
-        seen: set[str] = set()
-
-        def kill_one(event: Event) -> None:
-            seen.update(event.running)
-            if event.done >= 2 and len(seen) == 2 and processes[1].poll() is None:
-                processes[1].send_signal(signal.SIGKILL)
-
-        table = run_cells(cell_functions.slowly, cells, tmp_path / "run", scheduler=address, progress=kill_one)
-        assert processes[1].wait(timeout=10) == -signal.SIGKILL
+        processes += [start("worker", address, "--nthreads", "1", "--no-nanny") for _ in range(2)]
+        yield address, processes[1:]
     finally:
         for process in processes:
             process.kill()
-            process.communicate()
-    alone = run_cells(cell_functions.draw, [{"seed": seed} for seed in range(12)], tmp_path / "alone", workers=1)
-    first = alone[alone["step"] == 0]
-    assert table["value"].tolist() == first["value"].tolist()
-    assert len(marks_of(tmp_path)) in (12, 13), "at most the running cell was run twice"
+            process.wait()
 
 
 def _address(scheduler_file: Path) -> str:
-    import json
-
     for _ in range(300):
         try:
             return str(json.loads(scheduler_file.read_text())["address"])
         except (FileNotFoundError, ValueError):
             time.sleep(0.1)
     raise AssertionError("the scheduler did not start")
+
+
+@pytest.mark.slow
+def test_a_search_on_a_cluster_finds_what_it_finds_alone(cluster: tuple[str, object]) -> None:
+    workspace = OvercookedWorkspace(shape=(5, 5), prefix="sum")
+    alone = search(workspace, evaluations=3000, seed=1)
+    spread = search(workspace, evaluations=3000, seed=1, scheduler=cluster[0])
+    for field in ("solution", "objective", "index"):
+        np.testing.assert_array_equal(alone.archive.data(field), spread.archive.data(field))
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="needs SIGKILL")
+def test_a_cluster_loses_a_worker_and_no_result(
+    cluster: tuple[str, list[subprocess.Popen[bytes]]], tmp_path: Path
+) -> None:
+    address, (victim, _) = cluster
+    cells = with_marks(tmp_path, 12, seconds=0.5)
+    seen: set[str] = set()
+
+    def kill_one(event: Event) -> None:
+        seen.update(event.running)
+        if event.done >= 2 and len(seen) == 2 and victim.poll() is None:
+            victim.send_signal(signal.SIGKILL)
+
+    table = run_cells(cell_functions.slowly, cells, tmp_path / "run", scheduler=address, progress=kill_one)
+    assert victim.wait(timeout=10) == -signal.SIGKILL
+    alone = run_cells(cell_functions.draw, [{"seed": seed} for seed in range(12)], tmp_path / "alone", workers=1)
+    assert table["value"].tolist() == alone[alone["step"] == 0]["value"].tolist()
+    assert len(marks_of(tmp_path)) in (12, 13), "at most the running cell was run twice"

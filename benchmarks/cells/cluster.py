@@ -4,38 +4,16 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from benchmarks.cells.running import Outcome, run_one
 from benchmarks.cells.store import Cell
+from optimizers.cluster import connect
 
-if TYPE_CHECKING:
-    from distributed import Client
-
-__all__ = ["ClusterPool", "connect"]
+__all__ = ["ClusterPool"]
 
 _POLL = 0.5
 """Seconds after which progress per worker is asked for again."""
-
-
-def connect(scheduler: str, timeout: float = 10.0) -> Client:
-    """A client of a running scheduler.
-
-    Raises:
-        ImportError: Dask is not installed; the message says how to get it.
-        ConnectionError: Nobody answers at that address.
-    """
-    try:
-        from distributed import Client
-    except ImportError as error:
-        raise ImportError("a cluster needs Dask: pip install 'legible-envs[distributed]'") from error
-    try:
-        return Client(scheduler, timeout=timeout, set_as_default=False)
-    except (OSError, ValueError) as error:
-        raise ConnectionError(
-            f"no Dask scheduler answers at {scheduler!r} ({error}); start one with `dask scheduler` and workers with "
-            "`dask worker ADDRESS`"
-        ) from error
 
 
 def run_here(function: str, number: int, cell: Cell) -> Outcome:

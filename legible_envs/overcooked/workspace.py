@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from math import factorial
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +23,9 @@ from legible_envs.overcooked.recipes import PAPER_SOUPS, check_recipes, soup_tas
 from legible_envs.overcooked.score_tables import make_tables
 from legible_envs.tasks import TaskGraph
 from legible_envs.workspace import Array, Workspace, as_batch, as_single, check_choice
+
+if TYPE_CHECKING:
+    from legible_envs.rollouts import Trajectory
 
 __all__ = ["OvercookedWorkspace"]
 
@@ -356,6 +359,25 @@ class OvercookedWorkspace(Workspace):
         return scoring.ambiguity(self._one(genome), self.task, **self._score_settings())
 
     # -- configuration ---------------------------------------------------------------------------------------------
+
+    def simulate(
+        self,
+        genome: npt.ArrayLike | OvercookedLayout,
+        participants: int,
+        rng: np.random.Generator,
+        **settings: Any,
+    ) -> list[Trajectory]:
+        """Walks of simulated people who cook in one kitchen.
+
+        Args:
+            genome: ``(d,)``, or the kitchen.
+            participants: Number of people.
+            rng: Source of all randomness.
+            **settings: See :func:`legible_envs.overcooked.humans.simulate_participants`.
+        """
+        from legible_envs.overcooked.humans import simulate_participants
+
+        return simulate_participants(self._one(genome), participants, rng, task=self.task, **settings)
 
     def to_config(self) -> dict[str, Any]:
         """Settings as JSON-ready data; ``make_workspace`` and the constructor read them back."""
