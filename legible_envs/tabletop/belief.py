@@ -78,7 +78,7 @@ class EqOneBelief:
         if isinstance(start, str):
             start = layout.place(start)
         if start is not None:
-            self._begin(*_checked_point(start))
+            self._optimal = self._ways(*_checked_point(start))
 
     @property
     def belief(self) -> dict[str, float]:
@@ -97,13 +97,14 @@ class EqOneBelief:
         """
         x, y = _checked_point(point)
         if self._optimal is None:
-            self._begin(x, y)
+            self._optimal = self._ways(x, y)
         reach_posterior(*self._tables, self._optimal, self._prior, self._beta, x, y, self._row)
         return self.belief
 
-    def _begin(self, x: float, y: float) -> None:
-        self._optimal = np.empty(len(self.goals))
-        ways(*self._tables, x, y, self._optimal)
+    def _ways(self, x: float, y: float) -> npt.NDArray[np.float64]:
+        lengths = np.empty(len(self.goals))
+        ways(*self._tables, x, y, lengths)
+        return lengths
 
 
 class EqOne:
@@ -150,7 +151,7 @@ def _paths_to(
 
 def _checked_point(point: npt.ArrayLike) -> tuple[float, float]:
     try:
-        x, y = (float(v) for v in point)  # type: ignore[union-attr]
+        x, y = map(float, point)  # type: ignore[arg-type]
     except (TypeError, ValueError):
         x, y = math.nan, math.nan
     if not (math.isfinite(x) and math.isfinite(y)):
