@@ -21,7 +21,17 @@ if TYPE_CHECKING:
 
     from predictors.results import Evaluation, LearningCurve
 
-__all__ = ["COLOURS", "accuracy_figure", "confusion_figure", "learning_curve_figure", "save_figure"]
+__all__ = [
+    "COLOURS",
+    "Drawing",
+    "accuracy_figure",
+    "confusion_figure",
+    "footnote",
+    "heading",
+    "learning_curve_figure",
+    "save_figure",
+    "shade",
+]
 
 COLOURS: Final = ("#0072b2", "#d55e00", "#009e73", "#9c5b8b", "#a8780f", "#3a9fd0", "#5b5b5b", "#8c1c13")
 """Lines in order: Okabe and Ito's colours, darkened where too pale on white."""
@@ -30,8 +40,15 @@ _INK, _SOFT, _RULE = "#24292f", "#5d6670", "#e3e6ea"
 _FONT: Final = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
 
 
-class _Drawing:
-    """SVG elements in order, coordinates in CSS pixels."""
+class Drawing:
+    """SVG elements in order, coordinates in CSS pixels.
+
+    Args:
+        width: Of the figure.
+        height: Of the figure.
+        title: For screen readers.
+        description: For screen readers.
+    """
 
     def __init__(self, width: float, height: float, title: str, description: str) -> None:
         self.width, self.height = width, height
@@ -44,10 +61,12 @@ class _Drawing:
         self._parts: list[str] = []
 
     def text(self, x: float, y: float, text: str, anchor: str = "start", **style: Any) -> None:
+        """Text with its baseline at a point; ``style`` are SVG attributes."""
         more = "".join(f' {name.replace("_", "-")}="{escape(str(value))}"' for name, value in style.items())
         self._parts.append(f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}"{more}>{escape(text)}</text>')
 
     def line(self, points: Sequence[tuple[float, float]], colour: str, width: float = 1, dash: str = "") -> None:
+        """A line through points."""
         path = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
         dashed = f' stroke-dasharray="{dash}"' if dash else ""
         self._parts.append(
@@ -56,22 +75,26 @@ class _Drawing:
         )
 
     def area(self, points: Sequence[tuple[float, float]], colour: str, opacity: float) -> None:
+        """A filled polygon."""
         path = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
         self._parts.append(f'<polygon points="{path}" fill="{colour}" fill-opacity="{opacity:g}"/>')
 
     def dot(self, x: float, y: float, colour: str, tip: str) -> None:
+        """A dot with a tip to be read when pointed at."""
         self._parts.append(
             f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3.4" fill="{colour}" stroke="#fff" stroke-width="1">'
             f"<title>{escape(tip)}</title></circle>"
         )
 
     def box(self, x: float, y: float, width: float, height: float, colour: str, tip: str = "") -> None:
+        """A filled rectangle."""
         inner = f"<title>{escape(tip)}</title>" if tip else ""
         self._parts.append(
             f'<rect x="{x:.1f}" y="{y:.1f}" width="{width:.1f}" height="{height:.1f}" fill="{colour}">{inner}</rect>'
         )
 
     def render(self) -> str:
+        """The text of the figure."""
         return "\n".join([self._head, *self._parts, "</svg>\n"])
 
 
@@ -80,7 +103,7 @@ class _Axes:
 
     left, top, right, bottom = 70.0, 66.0, 20.0, 104.0
 
-    def __init__(self, drawing: _Drawing, low: float, high: float, legend: float) -> None:
+    def __init__(self, drawing: Drawing, low: float, high: float, legend: float) -> None:
         self.drawing, self.low, self.high = drawing, low, high if high > low else low + 1
         self.x1, self.y1 = drawing.width - self.right - legend, drawing.height - self.bottom
 
@@ -143,12 +166,13 @@ def _apart(heights: Sequence[float], gap: float, top: float, bottom: float) -> l
     return [height + shift for height in placed]
 
 
-def _heading(drawing: _Drawing, title: str, subtitle: str) -> None:
+def heading(drawing: Drawing, title: str, subtitle: str) -> None:
+    """Title and subtitle at the top of a figure."""
     drawing.text(16, 26, title, font_size=16, font_weight="600")
     drawing.text(16, 45, subtitle, fill=_SOFT)
 
 
-def _footnote(drawing: _Drawing, text: str) -> None:
+def footnote(drawing: Drawing, text: str) -> None:
     """The definition under a figure, in lines that fit its width."""
     limit = int((drawing.width - 32) / 5.2)
     lines, current = [], ""
@@ -180,13 +204,19 @@ def _series_names(table: pd.DataFrame, keys: Sequence[str]) -> dict[str, pd.Data
 
 
 def accuracy_figure(
-    results: Evaluation | pd.DataFrame, *, title: str = "Goals read correctly", width: float = 720, height: float = 430
+    results: Evaluation | pd.DataFrame,
+    *,
+    title: str = "Goals read correctly",
+    subtitle: str | None = None,
+    width: float = 720,
+    height: float = 430,
 ) -> str:
     """Accuracy against percentage observed, a line and a confidence band per predictor.
 
     Args:
         results: An evaluation, or the table of its :meth:`~predictors.results.Evaluation.accuracy`.
         title: Its heading.
+        subtitle: What the line and the band are; None says it of the tables named above.
         width: In pixels.
         height: In pixels.
 
@@ -201,9 +231,9 @@ def accuracy_figure(
     extra = [name for name in ("condition", "layout") if name in table]
     series = _series_names(table, ["predictor", *extra])
     about, level = table.attrs, table.attrs.get("level", 0.95)
-    drawing = _Drawing(width, height, title, f"Accuracy against percentage observed for {', '.join(series)}.")
+    drawing = Drawing(width, height, title, f"Accuracy against percentage observed for {', '.join(series)}.")
     units = f", {about['unit']}s as units" if "unit" in about else ""
-    _heading(drawing, title, f"mean over walks; bands: {level:.0%} confidence{units}")
+    heading(drawing, title, subtitle or f"mean over walks; bands: {level:.0%} confidence{units}")
     fractions = sorted(table["fraction"].unique().tolist())
     axes = _Axes(drawing, min(fractions), max(fractions), _legend_width(list(series)))
     ticks = [(f, f"{100 * f:.3g} %") for f in fractions[:: max(1, -(-len(fractions) // 11))]]
@@ -214,18 +244,24 @@ def accuracy_figure(
         drawing.text(axes.left + 4, axes.y(chance) - 5, "chance", fill=_SOFT, font_size=11)
     axes.names([(name, axes.series(i, name, part, "fraction")) for i, (name, part) in enumerate(series.items())])
     if "evaluation" in about or "definition" in about:
-        _footnote(drawing, str(about.get("evaluation", about.get("definition"))))
+        footnote(drawing, str(about.get("evaluation", about.get("definition"))))
     return drawing.render()
 
 
 def learning_curve_figure(
-    curve: LearningCurve | pd.DataFrame, *, title: str = "What more data buys", width: float = 720, height: float = 430
+    curve: LearningCurve | pd.DataFrame,
+    *,
+    title: str = "What more data buys",
+    subtitle: str | None = None,
+    width: float = 720,
+    height: float = 430,
 ) -> str:
     """Accuracy against the number of trajectories learned from.
 
     Args:
         curve: A learning curve, or the table of its :meth:`~predictors.results.LearningCurve.summary`.
         title: Its heading.
+        subtitle: What the line and the band are; None says it of the tables named above.
         width: In pixels.
         height: In pixels.
 
@@ -238,8 +274,9 @@ def learning_curve_figure(
     table = _table(curve, "summary")
     _check(table, ("predictor", "size", "accuracy", "low", "high"))
     series = _series_names(table, ["predictor"])
-    drawing = _Drawing(width, height, title, f"Accuracy against training size for {', '.join(series)}.")
-    _heading(drawing, title, "mean over fractions observed; bands: one standard deviation between splits")
+    drawing = Drawing(width, height, title, f"Accuracy against training size for {', '.join(series)}.")
+    said = subtitle or "mean over fractions observed; bands: one standard deviation between splits"
+    heading(drawing, title, said)
     sizes = sorted(int(size) for size in table["size"].unique())
     axes = _Axes(drawing, 0, max(sizes), _legend_width(list(series)))
     ticks: list[tuple[float, str]] = []
@@ -249,7 +286,7 @@ def learning_curve_figure(
     axes.frame(ticks, "trajectories learned from", "accuracy")
     axes.names([(name, axes.series(i, name, part, "size")) for i, (name, part) in enumerate(series.items())])
     if "evaluation" in table.attrs:
-        _footnote(drawing, str(table.attrs["evaluation"]))
+        footnote(drawing, str(table.attrs["evaluation"]))
     return drawing.render()
 
 
@@ -278,8 +315,8 @@ def confusion_figure(matrix: pd.DataFrame, *, title: str = "Which goals are take
     slanted = max(len(goal) for goal in goals) * 7.2 > cell
     foot = 48.0 + (max(len(goal) for goal in goals) * 5.2 if slanted else 18) + 46
     width = max(margin + cell * len(goals) + 60, 10 * len(title) + 32, 470)
-    drawing = _Drawing(width, 66 + cell * len(goals) + foot, title, f"Confusion matrix of {', '.join(goals)}.")
-    _heading(drawing, title, "share of each true goal; ties shared out")
+    drawing = Drawing(width, 66 + cell * len(goals) + foot, title, f"Confusion matrix of {', '.join(goals)}.")
+    heading(drawing, title, "share of each true goal; ties shared out")
     for i, goal in enumerate(goals):
         y = 66 + cell * i
         drawing.text(margin - 10, y + cell / 2 + (-1 if cell >= 30 else 4), goal, "end", font_weight="600")
@@ -287,7 +324,7 @@ def confusion_figure(matrix: pd.DataFrame, *, title: str = "Which goals are take
         for j, other in enumerate(goals):
             share, x = float(shares[i, j]), margin + cell * j
             tip = f"{goal} taken for {other}: {counts[i, j]:.1f} of {total[i, 0]:.0f}"
-            drawing.box(x + 1, y + 1, cell - 2, cell - 2, _shade(share), tip)
+            drawing.box(x + 1, y + 1, cell - 2, cell - 2, shade(share), tip)
             ink = "#fff" if share > 0.55 else _INK
             drawing.text(x + cell / 2, y + cell / 2 + 4, f"{100 * share:.0f}", "middle", fill=ink,
                          font_weight="600" if i == j else "400")  # fmt: skip
@@ -300,11 +337,11 @@ def confusion_figure(matrix: pd.DataFrame, *, title: str = "Which goals are take
     drawing.text(margin + cell * len(goals) / 2, 66 + cell * len(goals) + foot - 60, "predicted goal, %", "middle",
                  fill=_SOFT)  # fmt: skip
     if "evaluation" in matrix.attrs:
-        _footnote(drawing, str(matrix.attrs["evaluation"]))
+        footnote(drawing, str(matrix.attrs["evaluation"]))
     return drawing.render()
 
 
-def _shade(share: float) -> str:
+def shade(share: float) -> str:
     """From near white to the first line's blue, by share."""
     pale, full = (244, 247, 250), (0, 92, 148)
     mixed = (round(a + (b - a) * min(max(share, 0.0), 1.0)) for a, b in zip(pale, full, strict=True))
