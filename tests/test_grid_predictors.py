@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections import Counter
 from typing import Any
@@ -30,6 +31,7 @@ from predictors import (
 )
 from predictors.checks import example_walks
 from predictors.grid.graphs import walk_graph
+from predictors.grid.nearest import votes_of_nearest
 from predictors.grid.priors import GoalPrior
 
 ROOM = OvercookedLayout.from_ascii("XOXTX\nX   X\nX V D\nX   X\nXXSPX")
@@ -247,6 +249,23 @@ def test_neighbours_are_all_that_are_as_near() -> None:
         assert row.argmax() == 1
     everyone = GridNeighbours(k=1000).fit(walks).predict_proba([walks[0].first(1), walks[8].first(3)])
     assert everyone[0] == pytest.approx(everyone[1])
+
+
+def test_votes_of_the_nearest_are_those_of_a_full_sort() -> None:
+    rng = np.random.default_rng(0)
+    for count, k in itertools.product((1, 2, 7, 300), (1, 3, 15, 1_000)):
+        features = rng.integers(0, 3, (count, 6)) / 2.0  # few values: many are equally near
+        sizes = 1.0 / rng.integers(1, 8, count)
+        votes = np.eye(3)[rng.integers(0, 3, count)] * sizes[:, None]
+        query = rng.integers(0, 3, 6) / 2.0
+        there = np.flatnonzero(query)
+        squares = (features**2).sum(axis=1)
+        found = votes_of_nearest(there, query[there], np.ascontiguousarray(features.T), squares, votes, sizes, float(k))
+        distances = ((features - query) ** 2).sum(axis=1).round(9)
+        order = distances.argsort()
+        enough = np.searchsorted(np.cumsum(sizes[order]), k - 1e-9)
+        limit = distances[order[min(enough, count - 1)]]
+        assert found == pytest.approx(votes[distances <= limit].sum(axis=0))
 
 
 def test_logistic_regression_learns_what_can_be_learned() -> None:

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from legible_envs.rollouts import Trajectory
+from predictors.grid.nearest import votes_of_nearest
 from predictors.grid.prefixes import PrefixEncoder, PrefixPredictor, Steps, distinct_prefixes
 
 __all__ = ["GridNeighbours"]
-
-_FIRST: Final = 128  # the k-th neighbour is mostly among so many: sorting them all would take ten times as long
 
 
 class GridNeighbours(PrefixPredictor):
@@ -48,16 +46,7 @@ class GridNeighbours(PrefixPredictor):
     def _read(self, walk: Trajectory, cells: Steps) -> npt.NDArray[np.float64]:
         query = self._encoder.encode(walk, cells)
         there = np.flatnonzero(query)  # a dozen features of hundreds
-        # Rounded so that equally near ones stay equally near on every machine.
-        distances = np.round(self._squares - 2.0 * (query[there] @ self._columns_first[there]), 9)
-        limit = self._distance_of_kth(distances)
-        return self._weights[np.flatnonzero(distances <= limit)].sum(axis=0) + self._fallback
-
-    def _distance_of_kth(self, distances: npt.NDArray[np.float64]) -> float:
-        count = len(distances)
-        nearest = np.argpartition(distances, _FIRST)[:_FIRST] if count > _FIRST else np.arange(count)
-        if self._sizes[nearest].sum() < self.k:
-            nearest = np.arange(count)
-        order = nearest[np.argsort(distances[nearest])]
-        enough = int(np.searchsorted(np.cumsum(self._sizes[order]), self.k - 1e-9))
-        return float(distances[order[min(enough, len(order) - 1)]])
+        found = votes_of_nearest(
+            there, query[there], self._columns_first, self._squares, self._weights, self._sizes, float(self.k)
+        )
+        return found + self._fallback
