@@ -22,6 +22,7 @@ __all__ = ["Canvas", "Image", "Sprite", "load_pygame", "mix", "paste", "rgb", "t
 Image = npt.NDArray[np.uint8]
 Point = tuple[float, float]
 _FINE: Final = 192  # sprites are drawn at least this fine before they are averaged down
+_BAND: Final = 32
 
 
 def load_pygame() -> Any:
@@ -168,11 +169,15 @@ class Canvas:
         """The finished sprite: every pixel the average of the finer ones under it."""
         wide, tall = self._pixels
         raw = np.frombuffer(self._pygame.image.tobytes(self._sheet, "RGBA"), np.uint8)
-        fine = raw.reshape(tall, self._factor, wide, self._factor, 4).astype(np.float64)
-        alpha = fine[..., 3:]
-        colour = (fine[..., :3] * alpha / 255).mean(axis=(1, 3))
-        opacity = alpha.mean(axis=(1, 3)) / 255
-        return Sprite(np.rint(colour).astype(np.uint16), np.floor((1 - opacity) * 256).astype(np.uint16))
+        sheet = raw.reshape(tall, self._factor, wide, self._factor, 4)
+        colour, through = np.empty((tall, wide, 3), np.uint16), np.empty((tall, wide, 1), np.uint16)
+        for top in range(0, tall, _BAND):  # a band at a time: a whole page in floating point would be large
+            band = slice(top, top + _BAND)
+            fine = sheet[band].astype(np.float64)
+            alpha = fine[..., 3:]
+            colour[band] = np.rint((fine[..., :3] * alpha / 255).mean(axis=(1, 3)))
+            through[band] = np.floor((1 - alpha.mean(axis=(1, 3)) / 255) * 256)
+        return Sprite(colour, through)
 
 
 @lru_cache(maxsize=1024)

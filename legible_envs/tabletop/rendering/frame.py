@@ -1,0 +1,64 @@
+"""From metres on the table to pixels of a picture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from legible_envs.tabletop.things import Table
+
+__all__ = ["Frame", "check_width"]
+
+
+def check_width(width: int) -> int:
+    """The width of a picture as given, if it can be drawn."""
+    if isinstance(width, bool) or not isinstance(width, int | np.integer) or not 120 <= width <= 4096:
+        raise ValueError(f"width must be a whole number of pixels from 120 to 4096, got {width!r}")
+    return int(width)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Where a table lies in a picture ``width`` pixels wide: a small margin round it, ``y = 0`` at the lower edge.
+
+    Attributes:
+        width: Pixels.
+        size: ``(width, depth)`` of the table in metres.
+    """
+
+    width: int
+    size: tuple[float, float]
+
+    @classmethod
+    def of(cls, table: Table, width: int) -> Frame:
+        """The frame of a table."""
+        return cls(check_width(width), table.size)
+
+    @property
+    def margin(self) -> int:
+        """Pixels round the table."""
+        return max(3, round(self.width * 0.018))
+
+    @property
+    def scale(self) -> float:
+        """Pixels per metre."""
+        return (self.width - 2 * self.margin) / self.size[0]
+
+    @property
+    def height(self) -> int:
+        """Pixels."""
+        return round(self.size[1] * self.scale) + 2 * self.margin
+
+    def pixel(self, x: float, y: float) -> tuple[float, float]:
+        """``(column, row)`` of a point on the table."""
+        return self.margin + x * self.scale, self.height - self.margin - y * self.scale
+
+    def unit(self, x: float, y: float) -> tuple[float, float]:
+        """The same on a canvas on which one unit is the picture's width."""
+        column, row = self.pixel(x, y)
+        return column / self.width, row / self.width
+
+    def length(self, metres: float) -> float:
+        """Metres as a share of the picture's width."""
+        return metres * self.scale / self.width
