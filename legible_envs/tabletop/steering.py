@@ -47,13 +47,13 @@ class Steering:
         distance = math.hypot(dx, dy)
         if distance == 0.0:
             return 0.0, 0.0
-        speed = min(self.max_speed, math.sqrt(2 * self.acceleration * distance), distance * self.rate)
+        speed = min(self.max_speed, self._stopping_speed(distance), distance * self.rate)
         direction = math.atan2(dy, dx)
         radius = self.clearance + _MARGIN
         away = math.dist(gripper, hand)
         if (
             self.clearance > 0
-            and 0 < away < _LOOK_AHEAD
+            and 1e-9 < away < _LOOK_AHEAD
             and away < distance + radius < distance + math.dist(there, hand)
         ):
             to_hand = math.atan2(hand[1] - gripper[1], hand[0] - gripper[0])
@@ -67,10 +67,11 @@ class Steering:
         """The velocity without what would bring the gripper too near to the hand, or with what takes it away."""
         rx, ry = gripper[0] - hand[0], gripper[1] - hand[1]
         away = math.hypot(rx, ry)
-        outx, outy = (rx / away, ry / away) if away > 0 else (0.0, 1.0)
+        # From right under it: away from where the person sits.
+        outx, outy = (rx / away, ry / away) if away > 1e-9 else (0.0, 1.0)
         room = away - self.clearance
         if room >= 0:
-            least = -min(room * self.rate, math.sqrt(2 * self.acceleration * room))
+            least = -min(room * self.rate, self._stopping_speed(room))
         else:
             least = min(self.max_speed, -room * self.rate)
         outward = velocity[0] * outx + velocity[1] * outy
@@ -80,3 +81,8 @@ class Steering:
         most = math.sqrt(max(self.max_speed**2 - least**2, 0.0))
         along = min(max(along, -most), most)
         return least * outx - along * outy, least * outy + along * outx
+
+    def _stopping_speed(self, distance: float) -> float:
+        """The speed from which it comes to rest over a distance, if it is changed only once in ``1 / rate`` seconds."""
+        half = 0.5 / self.rate
+        return self.acceleration * (math.sqrt(half * half + 2 * distance / self.acceleration) - half)
