@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.rollouts import Trajectory
+from legible_envs.tabletop.layout import TabletopLayout
 from predictors.reaching.places import PlacePredictor, straight_lines
 
 __all__ = ["StraightLineBayesian"]
@@ -18,12 +19,18 @@ class StraightLineBayesian(PlacePredictor):
     r"""The posterior over goals of a hand that moves nearly straight.
 
     ``P(G | S->Q) ∝ exp(-beta (C(S->Q) + C*(Q->G) - C*(S->G)))`` (Eq. 1 of Tung et al., HRI 2024, after Dragan and
-    Srinivasa, 2013) with a uniform prior; the cost of a way is its length and the cheapest is the straight line. The
-    length so far is the same for every goal and cancels. With nothing or one position observed the belief is the prior,
-    exactly. Goals are where a trajectory's ``goal_positions`` say, else where reaches ended in ``fit``.
+    Srinivasa, 2013) with a uniform prior; the cost of a way is its length. The length so far is the same for every goal
+    and cancels. With nothing or one position observed the belief is the prior, exactly.
+
+    The cheapest way ``C*`` is the straight line to where a trajectory's ``goal_positions`` say that goals are, else to
+    where reaches ended in ``fit``. Over a :class:`~legible_envs.tabletop.TabletopLayout` it is the shortest path among
+    the obstacles to the object of that name: a hand inside an obstacle counts as being at the nearest free point, and
+    where there is no way the straight line counts, so that every cost is finite. This is the belief of
+    :class:`~legible_envs.tabletop.belief.EqOneBelief`.
 
     Args:
         beta: Rationality, per metre. Which goal is on top does not depend on it.
+        obstacles: Whether a table's obstacles count; straight lines everywhere if False.
 
     Attributes:
         classes_: ``(K,)`` names of all goals and candidates seen in ``fit``, sorted.
@@ -37,8 +44,9 @@ class StraightLineBayesian(PlacePredictor):
         [[0.5, 0.5], [0.197, 0.803]]
     """
 
-    def __init__(self, beta: float = 20.0) -> None:
+    def __init__(self, beta: float = 20.0, obstacles: bool = True) -> None:
         self.beta = beta
+        self.obstacles = obstacles
 
     def fit(self, X: Sequence[Trajectory], y: object = None) -> Self:
         """Learn the goals' names and places; see :meth:`GoalPredictor.fit`."""
@@ -48,6 +56,24 @@ class StraightLineBayesian(PlacePredictor):
     def _check_beta(self) -> None:
         if isinstance(self.beta, bool) or not isinstance(self.beta, int | float) or not 0 <= self.beta < np.inf:
             raise ValueError(f"`beta` must be a finite number >= 0, got {self.beta!r}")
+
+    def weigh_walk(self, walk: Trajectory) -> npt.NDArray[np.float64]:
+        """See :meth:`PlacePredictor.weigh_walk`.
+
+        Raises:
+            ValueError: A candidate is no object of the trajectory's table.
+        """
+        if not self.obstacles or not isinstance(walk.layout, TabletopLayout):
+            return super().weigh_walk(walk)
+        from legible_envs.tabletop.belief import EqOneBelief
+
+        self._check_beta()
+        if walk.is_grid or walk.states.shape[1] != 2:
+            raise ValueError(f"expected positions (x, y) on a table, got {walk.states.shape[1]}-d {walk.states.dtype}")
+        belief = EqOneBelief(
+            walk.layout, self.beta, start=walk.states[0], goals=walk.candidates, positions=walk.goal_positions
+        )
+        return np.array(list(belief.update(walk.states[-1]).values()))
 
     def weigh(self, states: npt.NDArray[np.floating], places: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """See :meth:`PlacePredictor.weigh`."""

@@ -81,6 +81,10 @@ class PlacePredictor(GoalPredictor):
     def weigh(self, states: npt.NDArray[np.floating], places: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """``(n,)`` weights >= 0, not all 0, of goals at ``(n, d)`` places after ``(T, d)`` states, T >= 1."""
 
+    def weigh_walk(self, walk: Trajectory) -> npt.NDArray[np.float64]:
+        """``(n,)`` weights of a reach's candidates after at least one state; for subclasses that look at more."""
+        return self.weigh(walk.states, goal_places(walk, self.places_))
+
     def predict_proba(self, X: Sequence[Trajectory]) -> npt.NDArray[np.float64]:
         """See :meth:`GoalPredictor.predict_proba`."""
         walks = self._check_trajectories(X)
@@ -89,6 +93,6 @@ class PlacePredictor(GoalPredictor):
         for row, walk in enumerate(walks):
             weights = np.ones(len(walk.candidates))
             if walk.num_states:
-                weights = self.weigh(walk.states, goal_places(walk, self.places_))
+                weights = self.weigh_walk(walk)
             probabilities[row, columns[row]] = weights / weights.sum()
         return probabilities
