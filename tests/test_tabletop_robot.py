@@ -502,3 +502,91 @@ def test_a_home_off_the_table_is_rejected_at_the_table():
     with pytest.raises(ValueError, match="off the table"):
         RobotPartner(home=(2, 0)).reset(COLUMNS.layout, COLUMNS)
     assert RobotPartner(home=(0.2, 0.7)).reset(COLUMNS.layout, COLUMNS).tolist() == [0.2, 0.7]
+
+
+# -- the predictors of this project ------------------------------------------------------------------------------------
+
+
+def reaches_of_people(layout=COLUMNS.layout):
+    from legible_envs.tabletop.humans import simulate_participants
+
+    return simulate_participants(COLUMNS, layout, 4, np.random.default_rng(0))
+
+
+def test_a_fitted_predictor_plugs_in():
+    from predictors import StraightLineBayesian
+
+    straight = StraightLineBayesian(obstacles=False).fit(reaches_of_people())
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        team = Team(RobotPartner(straight), COLUMNS, seed=1).play()
+    # Without obstacles the built-in belief is the same; rounding may differ.
+    own = Team(RobotPartner(), COLUMNS, seed=1).play()
+    assert [(c.target, c.predicted, c.state) for _, c in team.log] == [
+        (c.target, c.predicted, c.state) for _, c in own.log
+    ]
+    for (_, theirs), (_, ours) in zip(team.log, own.log, strict=True):
+        assert (theirs.belief is None) == (ours.belief is None)
+        assert theirs.belief is None or theirs.belief == pytest.approx(ours.belief, abs=1e-9)
+    walled = Team(RobotPartner(straight), COLUMNS, WALLED, seed=1).play()
+    assert walled.log[20][1].belief != Team(RobotPartner(), COLUMNS, WALLED, seed=1).play().log[20][1].belief
+
+
+@pytest.mark.parametrize(
+    "spec",
+    [
+        "predictors.reaching.bayesian:StraightLineBayesian",
+        "predictors.reaching.gaussian:TimeSeriesGaussian",
+        "predictors:ReachLogistic",
+    ],
+)
+def test_a_predictor_named_by_its_class_is_fitted_on_simulated_people(spec):
+    robot = RobotPartner(spec)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        team = Team(robot, COLUMNS, WALLED, seed=2).play(4.0)
+    assert robot.failure is None
+    assert any(c.belief is not None for _, c in team.log)
+    assert any(c.target for _, c in team.log)
+
+
+def test_on_another_table_it_is_fitted_anew():
+    spec = "predictors.reaching.bayesian:StraightLineBayesian"
+    robot = RobotPartner(spec)
+    first = commands(Team(robot, COLUMNS, WALLED, seed=2).play())
+    assert Team(robot, TEA, seed=2).play().finished
+    assert commands(Team(robot, COLUMNS, WALLED, seed=2).play()) == first
+    assert commands(Team(RobotPartner(spec), COLUMNS, WALLED, seed=2).play()) == first
+    assert robot.failure is None
+
+
+def test_fitting_leaves_the_users_predictor_alone():
+    from predictors import StraightLineBayesian
+
+    mine = StraightLineBayesian()
+    team = Team(RobotPartner(mine), COLUMNS, seed=1).play()
+    assert any(c.belief for _, c in team.log)
+    assert not hasattr(mine, "classes_")
+
+
+def test_a_predictor_that_cannot_be_fitted_is_reported():
+    class Unteachable(Uniform):
+        def fit(self, X):
+            raise ValueError("I know better")
+
+    robot = RobotPartner(Unteachable())
+    with pytest.warns(RuntimeWarning, match="know better"):
+        robot.reset(COLUMNS.layout, COLUMNS)
+    assert robot.step(senses(AT_RED)).belief is None
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        robot.reset(COLUMNS.layout, COLUMNS)
+
+
+def test_importing_the_package_loads_nothing_heavy():
+    import subprocess
+    import sys
+
+    code = "import sys, legible_envs.tabletop; print([m for m in ('numba', 'sklearn', 'pymunk') if m in sys.modules])"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "[]"
