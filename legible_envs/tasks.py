@@ -217,6 +217,11 @@ class TaskGraph:
     # -- what users ask ------------------------------------------------------------------------------------------------
 
     @property
+    def states(self) -> StateSpace:
+        """All states of the task, for programs that play it: what may follow what."""
+        return self._space
+
+    @property
     def num_sequences(self) -> int:
         """Exact number of valid sequences."""
         return self._space.num_sequences

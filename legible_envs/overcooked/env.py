@@ -14,10 +14,11 @@ from legible_envs.overcooked import batch
 from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.overcooked.observations import grid_observation, vector_observation
 from legible_envs.overcooked.recipes import PAPER_SOUPS
-from legible_envs.overcooked.settings import JsonSpec, KitchenSettings, PackedKitchen, check_options, read_layout
+from legible_envs.overcooked.settings import KitchenSettings, PackedKitchen, read_layout
 from legible_envs.overcooked.snapshot import draw_small, make_view, name_goals, to_text
 from legible_envs.overcooked.vectors import CROSSINGS, DELIVERIES, STATE_SIZE, Kitchen, Vector
 from legible_envs.overcooked.view import GameView
+from legible_envs.specs import JsonSpec, check_options
 
 __all__ = ["OvercookedEnv"]
 

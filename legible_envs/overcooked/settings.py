@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Mapping, Sequence
-from enum import Enum
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from gymnasium import spaces
-from gymnasium.envs.registration import EnvSpec
 
 from legible_envs.errors import LayoutError
 from legible_envs.overcooked.distribution import LayoutDistribution, default_layout, read_distribution
@@ -25,10 +22,8 @@ from legible_envs.overcooked.vectors import POT_CELL, Kitchen, Vector
 __all__ = [
     "OBS_TYPES",
     "SHAPING",
-    "JsonSpec",
     "KitchenSettings",
     "PackedKitchen",
-    "check_options",
     "count_pots",
     "read_layout",
 ]
@@ -235,53 +230,6 @@ def _read_shaping(shaping: bool | Mapping[str, float]) -> Mapping[str, float]:
     return SHAPING if shaping else dict.fromkeys(SHAPING, 0.0)
 
 
-def check_options(options: Mapping[str, Any] | None, known: Sequence[str] = ("layout",)) -> Mapping[str, Any]:
-    """The options of a reset.
-
-    Raises:
-        ValueError: Unknown keys.
-    """
-    if not options:
-        return {}
-    unknown = sorted(str(key) for key in options if key not in known)
-    if unknown:
-        raise ValueError(f"unknown reset options {unknown}; known: {list(known)}")
-    return options
-
-
 def count_pots(layout: OvercookedLayout) -> int:
     """Number of pots in a kitchen."""
     return int(np.count_nonzero(layout.cells == POT_CELL))
-
-
-class JsonSpec:
-    """Keeps an environment's spec JSON: layouts and distributions given as objects are recorded as plain data."""
-
-    _spec: EnvSpec | None = None
-
-    @property
-    def spec(self) -> EnvSpec | None:
-        """How the environment was made, as ``gymnasium.make`` can repeat it."""
-        return self._spec
-
-    @spec.setter
-    def spec(self, value: EnvSpec | None) -> None:
-        if value is not None:
-            value = copy.copy(value)
-            value.kwargs = {key: _plain(argument) for key, argument in value.kwargs.items()}
-        self._spec = value
-
-
-def _plain(value: Any) -> Any:
-    """Plain data that means the same to the environment."""
-    if isinstance(value, OvercookedLayout):
-        return value.to_ascii()
-    if isinstance(value, Enum):
-        return value.value
-    if isinstance(value, np.ndarray | np.generic):
-        return value.tolist()
-    if isinstance(value, Mapping):
-        return {key: _plain(entry) for key, entry in value.items()}
-    if isinstance(value, tuple | list):
-        return [_plain(entry) for entry in value]
-    return value.to_config() if hasattr(value, "to_config") else value

@@ -17,17 +17,11 @@ from legible_envs.overcooked import batch
 from legible_envs.overcooked.batch_game import GameOfBatch
 from legible_envs.overcooked.env import NUM_ACTIONS, OvercookedEnv
 from legible_envs.overcooked.rules import pack_rules
-from legible_envs.overcooked.settings import (
-    JsonSpec,
-    KitchenSettings,
-    PackedKitchen,
-    check_options,
-    count_pots,
-    read_layout,
-)
+from legible_envs.overcooked.settings import KitchenSettings, PackedKitchen, count_pots, read_layout
 from legible_envs.overcooked.snapshot import draw_small, make_view, tile_pictures, to_text
 from legible_envs.overcooked.vectors import CROSSINGS, DELIVERIES, STATE_SIZE
 from legible_envs.overcooked.view import GameView
+from legible_envs.specs import JsonSpec, check_options
 
 __all__ = ["OvercookedVectorEnv"]
 

@@ -1,0 +1,64 @@
+"""What every environment here does with its arguments: a spec that stays JSON, and options that are checked."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from enum import Enum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from gymnasium.envs.registration import EnvSpec
+
+__all__ = ["JsonSpec", "check_options"]
+
+
+def check_options(options: Mapping[str, Any] | None, known: Sequence[str] = ("layout",)) -> Mapping[str, Any]:
+    """The options of a reset.
+
+    Raises:
+        ValueError: Unknown keys.
+    """
+    if not options:
+        return {}
+    unknown = sorted(str(key) for key in options if key not in known)
+    if unknown:
+        raise ValueError(f"unknown reset options {unknown}; known: {list(known)}")
+    return options
+
+
+class JsonSpec:
+    """Keeps an environment's spec JSON: layouts, tasks and distributions are recorded as plain data."""
+
+    _spec: EnvSpec | None = None
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """How the environment was made, as ``gymnasium.make`` can repeat it."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, value: EnvSpec | None) -> None:
+        if value is not None:
+            value = copy.copy(value)
+            value.kwargs = {key: _plain(argument) for key, argument in value.kwargs.items()}
+        self._spec = value
+
+
+def _plain(value: Any) -> Any:
+    """Plain data that means the same to the environment."""
+    for convert in ("to_ascii", "to_dict", "to_config"):
+        if hasattr(value, convert):
+            return _plain(getattr(value, convert)())
+    if isinstance(value, Enum):
+        return value.value
+    if isinstance(value, Path):
+        return str(value)
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, Mapping):
+        return {key: _plain(entry) for key, entry in value.items()}
+    if isinstance(value, tuple | list):
+        return [_plain(entry) for entry in value]
+    return value

@@ -1,0 +1,483 @@
+"""The playable table as a Gymnasium environment."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import numpy.typing as npt
+from gymnasium import spaces
+
+from legible_envs.errors import LayoutError
+from legible_envs.rollouts import Trajectory
+from legible_envs.specs import JsonSpec, check_options
+from legible_envs.tabletop.game import DT, RATE, TableGame
+from legible_envs.tabletop.layout import TabletopLayout
+from legible_envs.tabletop.observations import Observer
+from legible_envs.tabletop.settings import TableSettings, read_start
+from legible_envs.tabletop.task import TabletopTask
+from legible_envs.tabletop.team import Team, make_partner
+from legible_envs.tabletop.view import TableView
+from legible_envs.tabletop.watching import ReachWatcher
+
+__all__ = ["TabletopEnv"]
+
+Floats = npt.NDArray[np.float64]
+
+
+class TabletopEnv(JsonSpec, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
+    """A person builds something from objects on a table, alone or beside a robot that reads their reaches.
+
+    ## Description
+
+    A hand takes one object after another and carries each to its place, in an order that a task allows: by default
+    eight cubes to two columns of four, the first column before the second, as in Tung, Luebbers, Roncone and Hayes,
+    *Workspace Optimization Techniques to Improve Prediction of Human Motion During Human-Robot Collaboration* (HRI
+    2024). Where the objects lie and which virtual obstacles are projected on the table is the layout, and can be
+    changed from episode to episode.
+
+    Points are `(x, y)` in metres, origin front-left as the person sits, `x` to the right, `y` away from the person. One
+    step lasts 1/30 s.
+
+    **The hand** moves exactly as told, stays on the table, and slides along what stops it. It flies over objects and
+    comes down when it is slower than `slow_speed`, beside objects, never onto one: then it *touches*.
+
+    - *Take*: an empty, slow hand whose centre is at most `grasp_distance` from the outline of an object that is valid
+      now (the nearest, if several) takes it. What is not valid is never taken.
+    - *Push*: what an empty, slow hand runs into and cannot take gives way (`pymunk`: dry friction with the table,
+      collisions among objects, a rim round the table). `contact="always"` keeps the hand down at every speed,
+      `"never"` keeps it up. A hand that carries something is always up.
+    - *Carry* and *place*: what is held moves with the hand. A slow hand at most `release_distance` from the place of
+      what it holds puts it exactly there, for good. This place is the one in the task's configuration; for an object
+      without, any point of the assembly zone with room (in the task `bins`: the next goal that is touched).
+
+    **Virtual obstacles** are projected for the person alone: objects and the robot do not feel them. `"hard"` ones stop
+    the hand at their outline grown by the hand's half-width, exactly what shortest paths keep clear of; `"soft"` ones
+    can be crossed, and it is counted whenever the hand's centre enters the drawn rectangle.
+
+    **The robot** (`partner="robot"`) is asked 30 times a second. It waits until its predictor is sure what the person
+    goes for, then takes another valid object, the nearest to its gripper, and puts it in its place. Who takes an object
+    first has it; in the same step, the person.
+
+    ## Action Space
+
+    `Box(-1, 1, (2,), float32)`: velocity of the hand along `x` and `y`, in units of `max_speed`; a longer vector than 1
+    is shortened to 1.
+
+    ## Observation Space
+
+    A `Box` of `float32` and shape `(11 + 10 n + 7 m,)` for the `n` objects of the task and `m = max_obstacles`, with 4
+    more with a partner; `env.unwrapped.observation_names` names every index. Metres, and masks of 0 and 1:
+
+    | Index | Content |
+    | ----- | ------- |
+    | 0, 1  | hand `x`, `y` |
+    | 2, 3  | velocity of the hand in the last step / `max_speed` |
+    | 4     | the hand is down, at the height of the objects |
+    | 5     | the hand holds an object |
+    | 6 - 8 | where it belongs, `x`, `y`, and 1; or 0, 0, 0 if it has no such point, or the hand is empty |
+    | 9, 10 | where the present reach began, `x`, `y` |
+    | 11 + 10 i | object i: `x` |
+    | 12 + 10 i | object i: `y` |
+    | 13 + 10 i, 14 + 10 i | object i: cosine and sine of its angle |
+    | 15 + 10 i | object i lies free |
+    | 16 + 10 i | object i is in the hand |
+    | 17 + 10 i | object i is in the robot's gripper |
+    | 18 + 10 i | object i has been placed |
+    | 19 + 10 i | object i may validly be reached for now |
+    | 20 + 10 i | object i is the goal that was set, see `reset` |
+    | 11 + 10 n + 7 j | obstacle j is there; if not, its other numbers are 0 |
+    | 12 + 10 n + 7 j, 13 + 10 n + 7 j | obstacle j: `x`, `y` |
+    | 14 + 10 n + 7 j, 15 + 10 n + 7 j | obstacle j: cosine and sine of its angle in [0, pi) |
+    | 16 + 10 n + 7 j, 17 + 10 n + 7 j | obstacle j: length and width |
+    | 11 + 10 n + 7 m … 14 + 10 n + 7 m | with a partner only: its gripper's `x`, `y`, and velocity in m/s |
+
+    ## Rewards
+
+    `done_reward` (1) for every subtask that is finished, whoever does it: each object placed. `time_cost` (0.05) per
+    second and `crossing_cost` (0) per crossing of a soft obstacle are subtracted.
+
+    ## Starting State
+
+    Objects lie where the layout has them; the hand is where the task starts (`home`), empty and at rest.
+
+    The layout of an episode is, first match first: the one in `reset(options={"layout": ...})` or set by
+    `env.unwrapped.layout = ...` (from the next reset on), which stays until replaced (by None: until then as if never
+    set); the one given as `layout`; the task's own sorted arrangement.
+
+    ## Episode End
+
+    The episode terminates when the task is done. It is truncated after 1,800 steps, one minute (Gymnasium's
+    `max_episode_steps`).
+
+    ## Information
+
+    Every `reset` and `step` returns fresh
+
+    | Key             | Content |
+    | --------------- | ------- |
+    | `goals`         | names of what may validly be reached for now; empty while the hand carries something to its place |
+    | `candidate_set` | `"game"`: those goals are valid in the running game |
+    | `start`         | name of where the present reach began in the task: a start of the table, an object, or `elsewhere` |
+    | `stage`         | index in `task.graph.stages()` of the pair of `start` and `goals`; -1 if none |
+    | `holding`       | name of what the hand holds, or None |
+    | `done`          | number of subtasks finished |
+    | `crossings`     | number of crossings of soft obstacles |
+    | `path_length`   | metres the hand has moved |
+    | `time`          | seconds since the episode began |
+    | `layout_id`     | twelve hexadecimal digits that identify the layout |
+    | `belief`        | with a predictor or partner: `{goal: probability}` of the present reach, None where there is none |
+    | `robot_state`, `robot_target` | with a partner: what it does, and with which object |
+    | `completion_time`, `human_idle`, `robot_idle`, `concurrent_activity`, `functional_delay`, `conflicts`, `decision_time`, `decision_fraction`, `decided`, `decided_rightly` | with a partner: measures of the team so far, see `legible_envs.tabletop.fluency`; None where not known yet |
+
+    ## Arguments
+
+    Args:
+        task: What is built: `"columns"`, `"tea"`, `"bins"`, the path of a YAML file, a mapping, or a `TabletopTask`.
+        layout: The arrangement: a `TabletopLayout`, JSON text or a path, a mapping, or a genome with `max_obstacles`
+            obstacles.
+        obstacles: `"hard"` or `"soft"`.
+        contact: When the hand pushes: `"slow"`, `"always"` or `"never"`.
+        max_obstacles: Most obstacles a layout has.
+        max_speed: Of the hand, m/s.
+        slow_speed: Up to which the hand takes, places and pushes, m/s.
+        grasp_distance: Up to which it takes, metres from an object's outline.
+        release_distance: Up to which it places, metres from the place.
+        done_reward: For a finished subtask.
+        time_cost: Per second.
+        crossing_cost: Per crossing of a soft obstacle.
+        partner: None, `"robot"`, a mapping of arguments of `RobotPartner`, `"module:Class"`, or an object with its
+            methods `reset` and `step`.
+        predictor: What reads the person's reaches: `"eq1"`, the built-in Eq. 1; `"module:Class"`, the name of an
+            installed predictor, or an object; None for nothing, or the built-in one with a partner. A predictor that
+            fails is reported once by a warning; the robot waits and the episode goes on.
+        threshold: Probability from which the robot is sure.
+        render_mode: None, `"human"` (a window) or `"rgb_array"`.
+
+    Raises:
+        LayoutError: A layout that cannot be read, breaks a rule (`rule` names it), or is of another task.
+        TaskError: Not a task.
+        ValueError: Any other bad argument; unknown keys in the options of `reset`.
+        TypeError: A partner or predictor that lacks the methods.
+
+    ## Version History
+
+    * v0: first version.
+    """  # noqa: E501
+
+    metadata = {"render_modes": ["human", "rgb_array"], "render_fps": RATE}  # noqa: RUF012
+
+    def __init__(
+        self,
+        *,
+        task: Any = "columns",
+        layout: Any = None,
+        obstacles: str = "hard",
+        contact: str = "slow",
+        max_obstacles: int = 4,
+        max_speed: float = 2.0,
+        slow_speed: float = 0.2,
+        grasp_distance: float = 0.03,
+        release_distance: float = 0.05,
+        done_reward: float = 1.0,
+        time_cost: float = 0.05,
+        crossing_cost: float = 0.0,
+        partner: Any = None,
+        predictor: Any = None,
+        threshold: float = 0.8,
+        render_mode: str | None = None,
+    ) -> None:
+        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
+            raise ValueError(
+                f"`render_mode` must be None or one of {self.metadata['render_modes']}, got {render_mode!r}"
+            )
+        self.settings = TableSettings(
+            task=task,
+            layout=layout,
+            obstacles=obstacles,
+            contact=contact,
+            max_obstacles=max_obstacles,
+            max_speed=max_speed,
+            slow_speed=slow_speed,
+            grasp_distance=grasp_distance,
+            release_distance=release_distance,
+            done_reward=done_reward,
+            time_cost=time_cost,
+            crossing_cost=crossing_cost,
+            threshold=threshold,
+        )
+        self.render_mode = render_mode
+        self._game = TableGame(self.settings.task, self.settings.rules)
+        self._team = self._make_team(partner, predictor)
+        self._observer = Observer(self.settings.task, max_obstacles, partner is not None)
+        self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
+        self.observation_space = self._observer.space
+        self._chosen: TabletopLayout | None = None
+        self._window: Any = None
+
+    def _make_team(self, partner: Any, predictor: Any) -> Team:
+        reader = None if isinstance(predictor, str) and predictor == "eq1" else predictor
+        if partner is None:
+            return Team(watcher=None if predictor is None else ReachWatcher(reader))
+        if not self.settings.task.configuration:
+            raise ValueError(
+                f"a robot puts objects in their places in the configuration; task {self.settings.task.name!r} has none"
+            )
+        return Team(make_partner(partner, reader, self.settings.threshold))
+
+    # -- the Gymnasium interface --------------------------------------------------------------------------------------
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[npt.NDArray[np.float32], dict[str, Any]]:
+        """Start an episode.
+
+        Args:
+            seed: Seed of the environment's generator; None goes on with the one there is. Without a partner that uses
+                it, nothing here is random.
+            options: ``"layout"``: play on another layout from now on; None returns to the environment's own.
+                ``"start"``: where the hand starts this time, the name of a start or object of the table or ``(x, y)``.
+                ``"goal"``: what the first reach goes for, an object that is valid at first; until it has been taken,
+                the hand takes nothing else.
+
+        Returns:
+            ``(observation, info)``.
+
+        Raises:
+            LayoutError: A bad layout, start or goal; the environment goes on as if it had not been asked.
+            ValueError: Unknown option keys.
+        """
+        super().reset(seed=seed)
+        asked = check_options(options, ("layout", "start", "goal"))
+        chosen = self._chosen
+        if "layout" in asked:
+            chosen = None if asked["layout"] is None else self._read(asked["layout"])
+        layout = chosen or self.settings.layout
+        start = asked.get("start")
+        name, at = read_start(self.task.graph.start if start is None else start, layout)
+        goal = asked.get("goal")
+        if goal is not None:
+            self._check_goal(goal, self._game.progress.first_goals)
+        self._chosen = chosen
+        self._game.begin(layout, at, name, goal)
+        self._observer.enter(layout)
+        self._team.begin(self._game, self.np_random)
+        if self.render_mode == "human":
+            self.render()
+        return self._observer.observe(self._game, self._team), self._info()
+
+    def step(self, action: npt.ArrayLike) -> tuple[npt.NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+        """Advance by 1/30 s.
+
+        Args:
+            action: ``(2,)`` velocity of the hand in units of ``max_speed``.
+
+        Returns:
+            ``(observation, reward, terminated, truncated, info)``.
+
+        Raises:
+            ValueError: Not two finite numbers.
+        """
+        x, y = self._read_action(action)
+        game, settings = self._game, self.settings
+        crossings, held = game.crossings, game.holding
+        top = settings.rules.max_speed
+        finished = game.move_hand(x * top, y * top)
+        has_acted = bool(finished) or game.holding != held
+        finished += self._team.act(game)
+        self._team.log(game, has_acted)
+        self._team.sense(game)
+        crossed = game.crossings - crossings
+        reward = settings.done_reward * finished - settings.time_cost * DT - settings.crossing_cost * crossed
+        if self.render_mode == "human":
+            self.render()
+        return self._observer.observe(game, self._team), reward, game.progress.is_over, False, self._info()
+
+    def render(self) -> Any:
+        """Show the table: a picture ``(H, W, 3)`` uint8, or a window (None).
+
+        The picture is made by :func:`~legible_envs.tabletop.rendering.draw_scene`.
+        """
+        if self.render_mode is None:
+            name = self.spec.id if self.spec is not None else type(self).__name__
+            gym.logger.warn(
+                "You are calling render method without specifying any render mode. You can specify the render_mode at "
+                f'initialization, e.g. gym.make("{name}", render_mode="rgb_array")'
+            )
+            return None
+        from legible_envs.tabletop.rendering import draw_scene
+
+        picture = draw_scene(self.view())
+        if self.render_mode == "rgb_array":
+            return picture
+        if self._window is None:
+            from legible_envs.drawing.window import Window
+
+            self._window = Window("Legible table", fps=self.metadata["render_fps"])
+        self._window.show(picture)
+        return None
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._window is not None:
+            self._window.close()
+            self._window = None
+
+    # -- layouts -------------------------------------------------------------------------------------------------------
+
+    @property
+    def layout(self) -> TabletopLayout:
+        """The layout: the one set for the next reset, else the one being played on."""
+        return self._chosen or self._game.layout
+
+    @layout.setter
+    def layout(self, value: Any) -> None:
+        self._chosen = None if value is None else self._read(value)
+
+    def _read(self, value: Any) -> TabletopLayout:
+        known = (self._chosen, self._game.layout, self.settings.layout)
+        return value if any(value is layout for layout in known) else self.settings.read(value)
+
+    # -- what people and programs ask ---------------------------------------------------------------------------------
+
+    @property
+    def task(self) -> TabletopTask:
+        """What is built."""
+        return self.settings.task
+
+    @property
+    def observation_names(self) -> tuple[str, ...]:
+        """What each number of an observation is."""
+        return self._observer.names
+
+    @property
+    def hand(self) -> Floats:
+        """``(2,)`` centre of the hand."""
+        return np.array(self._game.hand)
+
+    @property
+    def holding(self) -> str | None:
+        """What the hand holds."""
+        return self._name(self._game.holding)
+
+    @property
+    def goals(self) -> tuple[str, ...]:
+        """What the person may validly reach for now; see ``info["goals"]``."""
+        return self._game.goals
+
+    @property
+    def goal(self) -> str | None:
+        """What the person is going for, where that was said: the hand takes nothing else until this reach ends.
+
+        Setting it shows it in observations and pictures.
+
+        Raises:
+            LayoutError: Set to an object that is not valid now.
+        """
+        return self._game.goal
+
+    @goal.setter
+    def goal(self, name: str | None) -> None:
+        if name is not None:
+            self._check_goal(name, self._game.goals)
+        self._game.goal = name
+
+    @property
+    def carry_to(self) -> Floats | None:
+        """``(2,)`` where what the hand holds belongs: the middle of the assembly zone if anywhere in it; or None."""
+        delivery = self._game.delivery
+        if delivery is None or delivery.kind == "goal":
+            return None
+        x0, y0, x1, y1 = self.task.layout.table.assembly
+        return np.array(delivery.at or ((x0 + x1) / 2, (y0 + y1) / 2))
+
+    @property
+    def positions(self) -> Floats:
+        """``(n, 2)`` where the objects are now, in the order of the layout."""
+        return self._game.positions.copy()
+
+    @property
+    def time(self) -> float:
+        """Seconds since the episode began."""
+        return self._game.time
+
+    @property
+    def max_speed(self) -> float:
+        """Of the hand, m/s: an action of length 1."""
+        return self.settings.rules.max_speed
+
+    def view(self) -> TableView:
+        """A snapshot of the table, for drawing."""
+        game, team = self._game, self._team
+        command, has_robot = team.command, team.gripper is not None
+        return TableView(
+            layout=game.layout,
+            task=self.task,
+            positions=game.positions.copy(),
+            angles=game.physics.angles.copy(),
+            status=game.statuses(),
+            hand=self.hand,
+            holding=self.holding,
+            robot=np.array(team.gripper) if has_robot else None,
+            robot_holding=self._name(game.robot_holding),
+            robot_target=command.target if command is not None else None,
+            belief=None if team.belief is None else dict(team.belief),
+            threshold=getattr(team.partner, "threshold", self.settings.threshold) if team.is_there else None,
+            goals=game.goals,
+            goal=game.goal,
+            trail=game.reaches.points.copy(),
+            time=game.time,
+            crossings=game.crossings,
+            obstacles_mode=self.settings.rules.obstacles,
+        )
+
+    def trajectories(self, *, participant: str = "", condition: str = "") -> list[Trajectory]:
+        """The reaches of this episode that ended at a goal, in order; carrying is no reach.
+
+        Each goes from where the hand was when it was empty (or, in the task ``bins``, had taken a piece) to where it
+        took its goal, at 30 points per second. Its candidates are those of the running game when it ended, where they
+        lay then.
+        """
+        return self._game.reaches.trajectories(self._game.layout, participant=participant, condition=condition)
+
+    def team_measures(self) -> Mapping[str, float]:
+        """Measures of the team so far; see :meth:`~legible_envs.tabletop.fluency.TeamMetrics.summary`."""
+        return self._team.summary()
+
+    def _info(self) -> dict[str, Any]:
+        game = self._game
+        goals = game.goals
+        return {
+            "goals": goals,
+            "candidate_set": "game",
+            "start": game.progress.place,
+            "stage": game.progress.stage(goals),
+            "holding": self._name(game.holding),
+            "done": game.progress.num_done,
+            "crossings": game.crossings,
+            "path_length": game.path_length,
+            "time": game.time,
+            "layout_id": game.layout.layout_id,
+            **self._team.info(),
+        }
+
+    def _name(self, i: int) -> str | None:
+        return self._game.names[i] if i >= 0 else None
+
+    def _check_goal(self, goal: Any, valid: tuple[str, ...]) -> None:
+        if goal not in valid:
+            raise LayoutError(
+                f"the goal must be an object that is valid now, one of {list(valid)}; got {goal!r}", rule="goal"
+            )
+
+    @staticmethod
+    def _read_action(action: npt.ArrayLike) -> tuple[float, float]:
+        try:
+            x, y = map(float, action)  # type: ignore[arg-type]
+            if not (abs(x) < np.inf and abs(y) < np.inf):
+                raise ValueError
+        except (TypeError, ValueError):
+            raise ValueError(f"expected an action of two finite numbers, got {action!r}") from None
+        return x, y

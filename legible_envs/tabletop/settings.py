@@ -1,0 +1,197 @@
+"""What a table environment was asked to be: arguments checked once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from legible_envs.errors import LayoutError, TaskError
+from legible_envs.tabletop.game import CONTACTS, GameRules
+from legible_envs.tabletop.layout import TabletopLayout
+from legible_envs.tabletop.task import TabletopTask
+from legible_envs.tabletop.things import Point, point
+
+__all__ = ["TableSettings", "read_layout", "read_start", "read_task"]
+
+ELSEWHERE: Final = "elsewhere"
+"""Name of a start that is none of the table's."""
+
+
+def read_task(value: Any) -> TabletopTask:
+    """Turn whatever describes a task into one.
+
+    Args:
+        value: A :class:`TabletopTask`, the name of one that comes with the package, the path of a YAML file, or a
+            mapping as :meth:`TabletopTask.from_dict` takes it.
+
+    Raises:
+        TaskError: Not a task.
+        FileNotFoundError: No such file.
+    """
+    if isinstance(value, TabletopTask):
+        return value
+    if isinstance(value, Mapping):
+        return TabletopTask.from_dict(value)
+    if isinstance(value, Path) or (isinstance(value, str) and value.endswith((".yaml", ".yml"))):
+        return TabletopTask.from_yaml(value)
+    if isinstance(value, str):
+        return TabletopTask.named(value)
+    raise TaskError(
+        f"`task` must be a TabletopTask, a name, a path or a mapping, got {type(value).__name__}: {value!r}"
+    )
+
+
+def read_layout(value: Any, task: TabletopTask, max_obstacles: int) -> TabletopLayout:
+    """Turn whatever describes an arrangement into a valid one of a task's objects.
+
+    Args:
+        value: A :class:`TabletopLayout`, JSON text or the path of a JSON file, a mapping as
+            :meth:`TabletopLayout.from_dict` takes it, or a genome ``(2n + 4 max_obstacles,)`` of the task's table.
+        task: The task.
+        max_obstacles: Most obstacles it may have.
+
+    Raises:
+        LayoutError: Not a layout; not valid; or not of this task's table and objects (they may lie elsewhere and be
+            painted otherwise).
+        FileNotFoundError: No such file.
+    """
+    if isinstance(value, TabletopLayout):
+        layout = value
+    elif isinstance(value, str | Path):
+        layout = TabletopLayout.from_json(value)
+    elif isinstance(value, Mapping):
+        layout = TabletopLayout.from_dict(value)
+    elif isinstance(value, Sequence | np.ndarray) and not isinstance(value, bytes | bytearray):
+        layout = task.layout.with_genome(_numbers(value), max_obstacles)
+    else:
+        raise LayoutError(
+            f"expected a TabletopLayout, JSON, a mapping or a genome, got {type(value).__name__}", rule="type"
+        )
+    _check_of_task(layout, task, max_obstacles)
+    layout.validate()
+    return layout
+
+
+def _numbers(value: Any) -> Any:
+    try:
+        array = np.asarray(value)
+        if array.dtype.kind not in "iuf":
+            raise ValueError(f"entries of type {array.dtype}")
+        return array.astype(np.float64)
+    except (ValueError, OverflowError) as error:
+        raise LayoutError(f"a genome must be a flat list of numbers: {error}", rule="genome") from error
+
+
+def _check_of_task(layout: TabletopLayout, task: TabletopTask, max_obstacles: int) -> None:
+    ours = task.layout
+    if layout.goals != ours.goals:
+        raise LayoutError(
+            f"this environment plays task {task.name!r} with the objects {list(ours.goals)}, in this order; the layout "
+            f"has {list(layout.goals)}",
+            rule="task",
+        )
+    if layout.table != ours.table:
+        raise LayoutError(
+            f"the layout's table {layout.table} is not that of task {task.name!r}, {ours.table}", rule="task"
+        )
+    for thing, known in zip(layout.objects, ours.objects, strict=True):
+        if thing.size != known.size:
+            raise LayoutError(
+                f"{thing.name} measures {thing.size} m in the layout and {known.size} m in task {task.name!r}",
+                rule="task",
+            )
+    if len(layout.obstacles) > max_obstacles:
+        raise LayoutError(
+            f"the layout has {len(layout.obstacles)} obstacles; this environment was made for at most {max_obstacles}, "
+            "make another with `max_obstacles=`",
+            rule="obstacles",
+        )
+
+
+def read_start(value: Any, layout: TabletopLayout) -> tuple[str, Point]:
+    """Name and point of where the hand starts.
+
+    Args:
+        value: The name of one of the table's starts or objects, or ``(x, y)`` in metres.
+        layout: The table.
+
+    Raises:
+        LayoutError: There is none of this name; or the point is off the table, or inside a grown obstacle.
+    """
+    if isinstance(value, str):
+        if value not in {*layout.table.starts, *layout.goals}:
+            raise LayoutError(
+                f"no start {value!r}; this table has {[*layout.table.starts, *layout.goals]}", rule="start"
+            )
+        name, at = value, layout.place(value)
+    else:
+        name, at = ELSEWHERE, point(value, "the start")
+    width, depth = layout.table.size
+    if not (0 <= at[0] <= width and 0 <= at[1] <= depth):
+        raise LayoutError(f"the start at {at} is off the table of {width:g} x {depth:g} m", rule="start")
+    if not layout.paths.is_free([at])[0]:
+        raise LayoutError(
+            f"the start at {at} lies inside an obstacle grown by the hand's half-width of {layout.table.hand:g} m",
+            rule="start",
+        )
+    return name, at
+
+
+class TableSettings:
+    """The checked arguments of :class:`~legible_envs.tabletop.env.TabletopEnv`, which documents them."""
+
+    def __init__(
+        self,
+        *,
+        task: Any,
+        layout: Any,
+        obstacles: str,
+        contact: str,
+        max_obstacles: int,
+        max_speed: float,
+        slow_speed: float,
+        grasp_distance: float,
+        release_distance: float,
+        done_reward: float,
+        time_cost: float,
+        crossing_cost: float,
+        threshold: float,
+    ) -> None:
+        self.task = read_task(task)
+        if obstacles not in ("hard", "soft"):
+            raise ValueError(f"`obstacles` must be 'hard' or 'soft', got {obstacles!r}")
+        if contact not in CONTACTS:
+            raise ValueError(f"`contact` must be one of {CONTACTS}, got {contact!r}")
+        if isinstance(max_obstacles, bool) or not isinstance(max_obstacles, int) or max_obstacles < 0:
+            raise ValueError(f"`max_obstacles` must be an integer >= 0, got {max_obstacles!r}")
+        self.max_obstacles = max_obstacles
+        self.rules = GameRules(
+            obstacles=obstacles,  # type: ignore[arg-type]
+            contact=contact,  # type: ignore[arg-type]
+            max_speed=_number("max_speed", max_speed, least=1e-3),
+            slow_speed=_number("slow_speed", slow_speed, least=1e-3),
+            grasp_distance=_number("grasp_distance", grasp_distance),
+            release_distance=_number("release_distance", release_distance),
+        )
+        self.done_reward = _number("done_reward", done_reward, least=-math.inf)
+        self.time_cost = _number("time_cost", time_cost)
+        self.crossing_cost = _number("crossing_cost", crossing_cost)
+        self.threshold = _number("threshold", threshold, most=1.0)
+        self.layout = self.task.layout if layout is None else self.read(layout)
+
+    def read(self, layout: Any) -> TabletopLayout:
+        """A layout this environment can play; see :func:`read_layout`."""
+        return read_layout(layout, self.task, self.max_obstacles)
+
+
+def _number(name: str, value: Any, least: float = 0.0, most: float = math.inf) -> float:
+    ok = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
+    if not ok or not math.isfinite(value) or not least <= value <= most:
+        bounds = "" if math.isinf(least) else f" >= {least:g}"
+        bounds += "" if math.isinf(most) else f" and <= {most:g}"
+        raise ValueError(f"`{name}` must be a finite number{bounds}, got {value!r}")
+    return float(value)
