@@ -16,3 +16,9 @@ def register_environments() -> None:
             vector_entry_point="legible_envs.overcooked.vector_env:OvercookedVectorEnv",
             max_episode_steps=1200,
         )
+    if "LegibleTabletop-v0" not in registry:
+        register(
+            id="LegibleTabletop-v0",
+            entry_point="legible_envs.tabletop.env:TabletopEnv",
+            max_episode_steps=1800,
+        )

@@ -54,6 +54,11 @@ def each(variants=tuple(VARIANTS)):
     return pytest.mark.parametrize(("name", "arguments"), cases + [pytest.param(i, {}, id=i) for i in IDS if i != NAME])
 
 
+def something(env):
+    """An action that changes the picture."""
+    return 0 if isinstance(env.action_space, gym.spaces.Discrete) else env.action_space.high / 2
+
+
 def rollout(env, seed, steps=120):
     env.action_space.seed(seed)
     results = [env.reset(seed=seed)]
@@ -67,8 +72,8 @@ def rollout(env, seed, steps=120):
 # -- every id ---------------------------------------------------------------------------------------------
 
 
-def test_the_kitchen_is_registered():
-    assert NAME in IDS
+def test_kitchen_and_table_are_registered():
+    assert IDS == [NAME, "LegibleTabletop-v0"]
 
 
 @each()
@@ -99,7 +104,8 @@ def test_copies_go_on_alone(name, arguments, copier):
     env = gym.make(name, **arguments)
     rollout(env, 2, steps=30)
     twin = copier(env)
-    actions = np.random.default_rng(0).integers(env.action_space.n, size=60)
+    env.action_space.seed(0)
+    actions = [env.action_space.sample() for _ in range(60)]
     ahead = [env.step(action) for action in actions] + [env.reset()]
     assert data_equivalence(ahead, [twin.step(action) for action in actions] + [twin.reset()], exact=True)
 
@@ -122,31 +128,30 @@ def test_pictures(name):
     before = env.render()
     assert before.dtype == np.uint8
     assert before.ndim == 3
-    env.step(0)
+    env.step(something(env))
     after = env.render()
     assert after.shape == before.shape
     assert not np.shares_memory(before, after)
     assert not np.array_equal(before, after)
 
 
-def test_every_render_mode_passes_the_check(monkeypatch):
+@pytest.mark.parametrize("name", IDS)
+def test_every_render_mode_passes_the_check(name, monkeypatch):
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        env = gym.make(NAME)
-        env.unwrapped.metadata["render_fps"] = 1000
-        try:
-            check_env(env.unwrapped)
-        finally:
-            env.unwrapped.metadata["render_fps"] = 8
+        env = gym.make(name)
+        monkeypatch.setitem(env.unwrapped.metadata, "render_fps", 1000)
+        check_env(env.unwrapped)
 
 
-def test_window(monkeypatch):
+@pytest.mark.parametrize("name", IDS)
+def test_window(name, monkeypatch):
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    env = gym.make(NAME, render_mode="human")
+    env = gym.make(name, render_mode="human")
     env.reset(seed=0)
     assert env.unwrapped._window is not None
-    env.step(0)
+    env.step(something(env))
     twin = copy.deepcopy(env)
     env.close()
     env.close()
@@ -166,8 +171,9 @@ def test_text():
     assert any(line.startswith("step 1,") for line in lines)
 
 
-def test_rendering_without_a_mode_warns():
-    env = OvercookedEnv()
+@pytest.mark.parametrize("name", IDS)
+def test_rendering_without_a_mode_warns(name):
+    env = gym.make(name).unwrapped
     env.reset(seed=0)
     with pytest.warns(UserWarning, match="render_mode"):
         assert env.render() is None
@@ -211,13 +217,28 @@ def in_a_new_process(code: str, **environment: str) -> str:
 
 def test_import_is_light():
     heavy = ["numba", "ribs", "sklearn", "torch", "pymunk", "pygame", "pandas", "scipy", "networkx"]
-    code = f"import sys, legible_envs, legible_envs.overcooked; print([m for m in {heavy} if m in sys.modules])"
+    packages = "legible_envs, legible_envs.overcooked, legible_envs.tabletop"
+    code = f"import sys, {packages}; print([m for m in {heavy} if m in sys.modules])"
     assert in_a_new_process(code) == "[]"
 
 
-def test_made_without_importing():
-    code = "import gymnasium; print(gymnasium.make('legible_envs:LegibleOvercooked-v0').spec.id)"
-    assert in_a_new_process(code) == NAME
+@pytest.mark.parametrize("name", IDS)
+def test_made_without_importing(name):
+    code = f"import gymnasium; print(gymnasium.make('legible_envs:{name}').spec.id)"
+    assert in_a_new_process(code) == name
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_synchronous_vectors(name):
+    envs = gym.make_vec(name, num_envs=2, vectorization_mode="sync")
+    envs.action_space.seed(0)
+    first, _ = envs.reset(seed=[3, 4])
+    for _ in range(30):
+        observations, rewards, *_ = envs.step(envs.action_space.sample())
+    assert observations.shape == (2, *envs.single_observation_space.shape)
+    assert rewards.shape == (2,)
+    alone = gym.make(name)
+    assert np.array_equal(alone.reset(seed=4)[0], first[1])
 
 
 def test_plays_as_plain_python():
