@@ -240,10 +240,8 @@ def test_people_differ_by_the_spreads_of_the_model() -> None:
     assert len({p.slope / p.intercept for p in people}) < 10  # all durations of a person go together
     assert people[0].endpoint_sd == 0.015
     assert pickle.loads(pickle.dumps(people[0])) == copy.deepcopy(people[0]) == people[0]
-    default = [
-        abs(p.bow_towards((0, 0), (0.3, 0.3)) + p.bow_trial * 0)
-        for p in (sample_person(np.random.default_rng(k)) for k in range(300))
-    ]
+    drawn = [sample_person(np.random.default_rng(seed)) for seed in range(300)]
+    default = [-person.bow_towards((0, 0), (0.3, 0.3)) for person in drawn]
     assert np.mean([0.06 <= bow <= 0.15 for bow in default]) > 0.8
 
 
