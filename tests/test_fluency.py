@@ -127,6 +127,22 @@ def test_a_reach_that_takes_no_time_was_read_at_its_end():
     assert (reading.duration, reading.fraction, reading.predicted) == (0.0, 1.0, None)
 
 
+def test_waiting_is_no_reach_and_without_a_choice_there_is_nothing_to_read():
+    metrics = measured(
+        [
+            Tick(0.0, reach=1, choices=0),
+            Tick(3.0, reach=1, choices=2),
+            Tick(4.0, reach=1, choices=1, predicted="cup"),
+            Tick(5.0, reach=1, choices=0, taken="cup"),
+            Tick(6.0, reach=2, choices=1, predicted="tea"),
+            Tick(7.0, reach=2, choices=0, taken="tea"),
+        ]
+    )
+    assert [(r.duration, r.decision_time, r.choices) for r in metrics.readings] == [(2.0, 1.0, 2), (1.0, 0.0, 1)]
+    found = metrics.summary()
+    assert (found["reaches"], found["decision_time"], found["decision_fraction"]) == (2, 1.0, 0.5)
+
+
 def test_before_anything_happened_shares_are_not_numbers():
     found = TeamMetrics().summary()
     assert found["time"] == found["conflicts"] == found["reaches"] == 0
@@ -162,5 +178,5 @@ def test_a_line_from_what_the_robot_sensed_and_did():
         2.0, origin, np.zeros((1, 2)), np.zeros(1), 3, origin, (), (), np.zeros((2, 2)), "cup", origin, None
     )
     command = Command(origin, target="milk", predicted="cup", decided=True, conflict=True)
-    assert tick_of(senses, command, True) == Tick(2.0, 3, "milk", 3, "cup", "cup", True)
+    assert tick_of(senses, command, True) == Tick(2.0, 3, "milk", 3, "cup", "cup", 0, True)
     assert tick_of(senses, command, False).human is None

@@ -32,6 +32,8 @@ class Tick:
         reach: How many reaches the person has begun; 0 before the first.
         taken: What the person holds.
         predicted: What the robot is sure the person reaches for; None while it is not.
+        choices: How many objects the person may validly reach for; 0 while they must wait. Does not count while they
+            hold something. A real choice unless told otherwise.
         conflict: Whether the robot gave up its target in this line because the person took it.
     """
 
@@ -41,6 +43,7 @@ class Tick:
     reach: int = 0
     taken: str | None = None
     predicted: str | None = None
+    choices: int = 2
     conflict: bool = False
 
 
@@ -59,6 +62,7 @@ def tick_of(senses: Senses, command: Command, human_active: bool) -> Tick:
         reach=senses.reach_number,
         taken=senses.person_holding,
         predicted=command.predicted,
+        choices=len(senses.goals),
         conflict=command.conflict,
     )
 
@@ -70,10 +74,11 @@ class Reading:
     Attributes:
         reach: Number of the reach.
         taken: What the person took.
-        duration: Seconds from the reach's first line to that in which the object was taken.
+        duration: Seconds from the reach's first line with anything to reach for to that in which it was taken.
         decision_time: Seconds from its first line to that in which the robot was sure for the first time; all of
             ``duration`` where it never was.
         predicted: What it was sure of then; None where it never was.
+        choices: The most objects that could validly be reached for in one line; with 1 there is nothing to read.
     """
 
     reach: int
@@ -81,6 +86,7 @@ class Reading:
     duration: float
     decision_time: float
     predicted: str | None
+    choices: int
 
     @property
     def fraction(self) -> float:
@@ -119,6 +125,7 @@ class TeamMetrics:
         self._acting: dict[str, _Action | None] = {"human": None, "robot": None}
         self._reach: Tick | None = None  # the line in which the last reach began
         self._reach_ended = True
+        self._choices = 0
         self._sure: Tick | None = None  # the line in which the robot was sure for the first time in this reach
         self._completed = math.nan
 
@@ -155,9 +162,9 @@ class TeamMetrics:
         Returns:
             ``time`` since the first line and ``completion_time``, the same once the task is done (NaN before), in
             seconds; as shares of ``time`` (NaN where it is 0) ``human_idle``, ``robot_idle``, ``concurrent_activity``
-            and ``functional_delay``; ``conflicts`` and ``reaches``, counted; over all ``reaches`` (NaN without any) the
-            means ``decision_time`` in seconds and ``decision_fraction``, in which a reach that the robot was never sure
-            of counts whole, and the shares ``decided`` and ``decided_rightly``.
+            and ``functional_delay``; ``conflicts`` and ``reaches``, counted; over the reaches with more than one choice
+            (NaN without any) the means ``decision_time`` in seconds and ``decision_fraction``, in which a reach that
+            the robot was never sure of counts whole, and the shares ``decided`` and ``decided_rightly``.
 
             Functional delay adds up, for every action (in the order they began, the person's first of two at once)
             that follows one of the other agent, the time from that one's end to its own beginning: less than 0 where
@@ -165,13 +172,13 @@ class TeamMetrics:
         """
         start = self._first.time if self._first else 0.0
         time = self._last.time - start if self._last else 0.0
-        count = len(self.readings)
+        readings = [reading for reading in self.readings if reading.choices > 1]
 
         def share(value: float) -> float:
             return value / time if time > 0 else math.nan
 
         def mean(values: Iterable[float]) -> float:
-            return math.fsum(values) / count if count else math.nan
+            return math.fsum(values) / len(readings) if readings else math.nan
 
         return {
             "time": time,
@@ -181,11 +188,11 @@ class TeamMetrics:
             "concurrent_activity": share(self._concurrent),
             "functional_delay": share(self._functional_delay()),
             "conflicts": float(self.conflicts),
-            "reaches": float(count),
-            "decision_time": mean(r.decision_time for r in self.readings),
-            "decision_fraction": mean(r.fraction for r in self.readings),
-            "decided": mean(r.predicted is not None for r in self.readings),
-            "decided_rightly": mean(r.correct for r in self.readings),
+            "reaches": float(len(self.readings)),
+            "decision_time": mean(r.decision_time for r in readings),
+            "decision_fraction": mean(r.fraction for r in readings),
+            "decided": mean(r.predicted is not None for r in readings),
+            "decided_rightly": mean(r.correct for r in readings),
         }
 
     def _count_time(self, last: Tick, now: float) -> None:
@@ -217,17 +224,19 @@ class TeamMetrics:
         )
 
     def _follow_reach(self, tick: Tick) -> None:
-        if tick.reach > 0 and (self._reach is None or tick.reach != self._reach.reach):
-            self._reach, self._reach_ended, self._sure = tick, False, None
+        if self._reach is None or tick.reach != self._reach.reach:
+            self._reach_ended = True  # given up, if it had not
+            if tick.reach > 0 and (tick.choices > 0 or tick.taken is not None):
+                self._reach, self._reach_ended, self._sure, self._choices = tick, False, None, 0
         if self._reach is None or self._reach_ended:
             return
-        if tick.taken is not None:
-            duration = tick.time - self._reach.time
-            sure = self._sure
-            decision = duration if sure is None else sure.time - self._reach.time
-            self.readings.append(
-                Reading(tick.reach, tick.taken, duration, decision, None if sure is None else sure.predicted)
-            )
-            self._reach_ended = True
-        elif self._sure is None and tick.predicted is not None:
-            self._sure = tick
+        if tick.taken is None:
+            self._choices = max(self._choices, tick.choices)
+            if self._sure is None and tick.predicted is not None:
+                self._sure = tick
+            return
+        duration = tick.time - self._reach.time
+        sure = self._sure
+        decision, goal = (duration, None) if sure is None else (sure.time - self._reach.time, sure.predicted)
+        self.readings.append(Reading(tick.reach, tick.taken, duration, decision, goal, self._choices))
+        self._reach_ended = True
