@@ -140,9 +140,10 @@ def _one_layout(workspace: Workspace, seed: int) -> Iterator[str]:
                 json.dumps(result)
             except (TypeError, ValueError) as error:
                 yield f"{name} is not plain data: {error}"
-        before, after = workspace.legibility(genome), workspace.legibility(workspace.prune(genome))
+        objective = workspace.objective("legibility")
+        before, after = (float(objective(g[None])[0]) for g in (genome, workspace.prune(genome)))
         if after < before - 1e-6 * max(1.0, abs(before)):
-            yield f"prune lowered the legibility from {before:g} to {after:g}"
+            yield f"prune lowered the legibility, penalty subtracted, from {before:g} to {after:g}"
     broken = np.full(workspace.genome_size, np.nan)
     if not np.isnan(np.asarray(workspace.legibility(broken[None]))).all():
         yield "a genome of NaN has a score; expected NaN"

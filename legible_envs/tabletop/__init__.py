@@ -1,7 +1,32 @@
-"""The table: layouts of boxes and virtual obstacles, tasks on them, and the shortest paths of a hand."""
+"""The table: layouts of boxes and virtual obstacles, tasks on them, their design, and the shortest paths of a hand."""
+
+from typing import TYPE_CHECKING
 
 from legible_envs.tabletop.layout import TabletopLayout
 from legible_envs.tabletop.task import TabletopTask
 from legible_envs.tabletop.things import Table, TableObject, VirtualObstacle
 
-__all__ = ["Table", "TableObject", "TabletopLayout", "TabletopTask", "VirtualObstacle"]
+if TYPE_CHECKING:
+    from legible_envs.tabletop.scoring import TabletopScorer
+    from legible_envs.tabletop.workspace import TabletopWorkspace
+
+__all__ = [
+    "Table",
+    "TableObject",
+    "TabletopLayout",
+    "TabletopScorer",
+    "TabletopTask",
+    "TabletopWorkspace",
+    "VirtualObstacle",
+]
+
+# Kernels need numba; the package must import without it.
+_LATE = {"TabletopScorer": "scoring", "TabletopWorkspace": "workspace"}
+
+
+def __getattr__(name: str) -> object:
+    if name in _LATE:
+        from importlib import import_module
+
+        return getattr(import_module(f"{__name__}.{_LATE[name]}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
