@@ -114,8 +114,6 @@ class EqOne:
         beta: Rationality per metre.
     """
 
-    classes_ = ()  # learns nothing, so it is always fitted
-
     def __init__(self, beta: float = BETA) -> None:
         self.beta = beta
 
