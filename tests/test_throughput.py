@@ -5,15 +5,20 @@ from __future__ import annotations
 import io
 import itertools
 import sys
+import textwrap
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 from rich.console import Console
 
-from benchmarks.throughput import run
+from benchmarks.throughput import peers, run
 from benchmarks.throughput.analysis import to_markdown
 from benchmarks.throughput.measure import Figure, alternate, rate
-from benchmarks.throughput.peers import Peer, PeerError
+from benchmarks.throughput.peer_maxent_irl import tasks
+from benchmarks.throughput.peers import IMITATION, IRL_MAXENT, OVERCOOKED_AI, Peer, PeerError, open_peer, opened
+from benchmarks.throughput.reading import noisy_walks, reading, save_problem
 from benchmarks.throughput.sweep import OPTIMUM_5X5, TARGETS, Settings, Target
 
 TINY = Settings(
@@ -26,6 +31,8 @@ TINY = Settings(
     search_evaluations=3_000,
     num_envs=2,
     fresh_starts=1,
+    walks=60,
+    evaluations=1,
 )
 
 
@@ -73,7 +80,7 @@ def test_the_whole_benchmark_reports_every_promise(tmp_path: Path, monkeypatch: 
     page = tmp_path / "docs" / "benchmarks.md"
     figures = run.run_benchmark(Console(file=stream, width=140), settings=TINY, out=page)
     keys = {figure.key for figure in figures}
-    assert keys >= {key for key in TARGETS if not key.endswith("/ peer")}
+    assert keys >= {key for key in TARGETS if not key.endswith(("/ peer", "/ gradient"))}
     assert all(value > 0 for figure in figures for value in figure.samples)
     text = page.read_text(encoding="utf-8")
     for figure in figures:
@@ -98,7 +105,86 @@ def test_markdown_marks_missed_promises() -> None:
 
 def test_an_interpreter_without_the_peer_is_an_error_that_says_so() -> None:
     with pytest.raises(PeerError, match="overcooked_ai_py"):
-        Peer(Path(sys.executable))
+        Peer(Path(sys.executable), OVERCOOKED_AI)
+
+
+def test_what_cannot_be_installed_is_left_out_with_a_reason(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(python: Path, requirements: object) -> None:
+        raise PeerError("no package index can be reached")
+
+    monkeypatch.setattr(peers, "_pip_install", refuse)
+    monkeypatch.setattr(peers.venv, "create", lambda home, **_: home.mkdir(parents=True))
+    remarks: list[str] = []
+    with opened({IMITATION: ("imitation", "problem.npz")}, tmp_path, remarks, Console(file=io.StringIO())) as found:
+        assert found == {}
+    assert remarks == ["imitation was not measured: no package index can be reached"]
+
+
+def test_environments_are_made_anew_where_other_versions_are_wanted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    installed: list[tuple[str, ...]] = []
+    monkeypatch.setattr(peers, "_pip_install", lambda python, requirements: installed.append(requirements))
+    monkeypatch.setattr(peers.venv, "create", lambda home, **_: home.mkdir(parents=True, exist_ok=True))
+    monkeypatch.setattr(peers, "Peer", lambda python, package, arguments: arguments)
+    for _ in range(2):
+        assert open_peer(IMITATION, tmp_path, ("one",)) == ("one",)
+    assert installed == list(IMITATION.requirements)
+    (tmp_path / "imitation" / "installed").write_text("imitation==0.1\n", encoding="utf-8")
+    open_peer(IMITATION, tmp_path)
+    assert installed == 2 * list(IMITATION.requirements)
+
+
+def expected_visits(moves: Any, starts: Any, reward: Any) -> Any:
+    """How often walks to a station enter or begin in each cell, by dense algebra: an oracle."""
+    count = len(reward) - 2
+    weights = np.exp(reward)[:, None] * moves.sum(axis=1)
+    sums = np.linalg.solve(np.eye(count) - weights[:count, :count], weights[:count, count])
+    flow = np.linalg.solve((np.eye(count) - weights[:count, :count]).T, starts[:count] / sums)
+    return flow * sums
+
+
+def test_other_packages_are_given_the_same_problem(tmp_path: Path) -> None:
+    from predictors.grid.walk_likelihood import collect_evidence
+
+    (evidence,) = collect_evidence(noisy_walks(200, np.random.default_rng(0))).values()
+    with np.load(save_problem(tmp_path)) as problem:
+        expected = sum(expected_visits(*task) for task in tasks(problem))
+        _, gradient = evidence.loss(-problem["rewards"])
+        np.testing.assert_allclose(problem["visits"] - expected, gradient, atol=1e-9)
+        assert problem["starts"].sum() == 200
+
+
+@pytest.mark.parametrize("right", [True, False])
+def test_other_packages_are_measured_if_they_agree(
+    right: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "irl_maxent").mkdir()
+    (tmp_path / "irl_maxent" / "__init__.py").touch()
+    stand_in = f"""
+        import numpy as np
+
+        def compute_expected_svf(p_transition, p_initial, terminal, reward):
+            goal = terminal[0]
+            weights = np.exp(reward)[:, None] * p_transition.sum(axis=2)
+            rest = np.eye(goal) - weights[:goal, :goal]
+            sums = np.linalg.solve(rest, weights[:goal, goal])
+            flow = np.linalg.solve(rest.T, p_initial[:goal] / sums) * {1.0 if right else 1.1}
+            return np.append(flow * sums, 1.0)
+    """
+    (tmp_path / "irl_maxent" / "maxent.py").write_text(textwrap.dedent(stand_in), encoding="utf-8")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    peer = Peer(Path(sys.executable), IRL_MAXENT, ("irl-maxent", str(save_problem(tmp_path))))
+    remarks: list[str] = []
+    figures = {figure.key: figure for figure in reading(TINY, {"irl-maxent": peer}, remarks)}
+    peer.close()
+    assert ("irl-maxent" in figures) == right
+    assert bool(remarks) != right
+    if right:
+        ratio, own = figures["irl-maxent / gradient"], figures["maxent gradient"]
+        assert ratio.samples == tuple(a / b for a, b in zip(figures["irl-maxent"].samples, own.samples, strict=True))
+    else:
+        assert "irl-maxent was not measured: its gradient differs" in remarks[0]
 
 
 def test_starting_runs_fresh_processes_with_and_without_compiled_code(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,52 +1,97 @@
-"""Overcooked-AI, measured beside this project: in a virtual environment of its own, in a process of its own."""
+"""Other people's packages, measured beside this project: each in a virtual environment and a process of its own."""
 
 from __future__ import annotations
 
+import contextlib
 import os
 import subprocess
 import sys
 import tempfile
 import venv
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from platformdirs import user_cache_path
 
-__all__ = ["Peer", "PeerError", "open_peer"]
+if TYPE_CHECKING:
+    from rich.console import Console
 
-REQUIREMENTS: Final = ("overcooked-ai==1.1.0", "scipy", "numpy<2", "setuptools<81")
-"""The peer, and what it needs without saying so."""
-INSTALL_SECONDS: Final = 600
+__all__ = ["IMITATION", "IRL_MAXENT", "OVERCOOKED_AI", "Package", "Peer", "PeerError", "open_peer", "opened"]
+
+INSTALL_SECONDS: Final = 1200
 
 
 class PeerError(RuntimeError):
     """The peer cannot be measured; the message says why."""
 
 
+@dataclass(frozen=True)
+class Package:
+    """A peer, and how it is installed and asked.
+
+    Attributes:
+        name: What tables call it; the name of its environment too.
+        script: The program beside this file that runs in its environment.
+        requirements: What each call of pip installs, one after the other.
+    """
+
+    name: str
+    script: str
+    requirements: tuple[tuple[str, ...], ...]
+
+
+OVERCOOKED_AI: Final = Package(
+    "overcooked-ai", "peer_overcooked_ai.py", (("overcooked-ai==1.1.0", "scipy", "numpy<2", "setuptools<81"),)
+)
+"""Its last two requirements are those it does not mention."""
+
+# A torch that is there already keeps pip from pulling in a build with CUDA.
+IMITATION: Final = Package(
+    "imitation", "peer_maxent_irl.py", (("torch==2.13.0",), ("imitation==1.0.1", "setuptools<81"))
+)
+
+IRL_MAXENT: Final = Package("irl-maxent", "peer_maxent_irl.py", (("irl-maxent==0.1.0",),))
+
+
 class Peer:
-    """A running Overcooked-AI that counts its steps on request.
+    """A running peer that measures itself on request.
 
     Args:
         python: Interpreter of the peer's environment.
+        package: The peer.
+        arguments: Of its program.
+
+    Raises:
+        PeerError: It does not run.
     """
 
-    def __init__(self, python: Path) -> None:
+    def __init__(self, python: Path, package: Package, arguments: Sequence[str] = ()) -> None:
         # What it has to say goes to a file: a pipe that nobody reads would stop it once full.
         self._complaints = tempfile.TemporaryFile(mode="w+")  # noqa: SIM115  (closed in `close`)
-        with as_file(files("benchmarks.throughput") / "peer_overcooked_ai.py") as script:
+        with as_file(files("benchmarks.throughput") / package.script) as script:
             self._process = subprocess.Popen(
-                [str(python), str(script)],
+                [str(python), str(script), *arguments],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=self._complaints,
                 text=True,
-                env={**os.environ, "SDL_VIDEODRIVER": "dummy"},
+                env={**os.environ, "SDL_VIDEODRIVER": "dummy", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
             )
             self._answer("ready")
 
+    def rate(self, request: str) -> float:
+        """How much it does per second of processor time; see its program for requests.
+
+        Raises:
+            PeerError: It stopped.
+        """
+        return float(self.ask(request, "rate"))
+
     def steps_per_second(self, seconds: float, *, observe: bool) -> float:
-        """Steps per second with random actions.
+        """Steps of Overcooked-AI per second with random actions.
 
         Args:
             seconds: How long to measure.
@@ -55,10 +100,15 @@ class Peer:
         Raises:
             PeerError: It stopped.
         """
+        return self.rate(f"{seconds} {int(observe)}")
+
+    def ask(self, request: str, answer: str) -> str:
+        """What follows the word ``answer`` in its reply."""
         assert self._process.stdin is not None
-        self._process.stdin.write(f"{seconds} {int(observe)}\n")
-        self._process.stdin.flush()
-        return float(self._answer("rate").removeprefix("rate "))
+        with contextlib.suppress(BrokenPipeError):  # it has stopped: its last words are said below
+            self._process.stdin.write(f"{request}\n")
+            self._process.stdin.flush()
+        return self._answer(answer).removeprefix(answer).strip()
 
     def _answer(self, start: str) -> str:
         """The next line that begins so; the peer's own prints are passed over."""
@@ -75,37 +125,66 @@ class Peer:
     def close(self) -> None:
         """End the process."""
         assert self._process.stdin is not None
-        self._process.stdin.close()
+        with contextlib.suppress(BrokenPipeError):
+            self._process.stdin.close()
         self._process.wait(timeout=30)
         self._complaints.close()
 
 
-def open_peer(folder: Path | None = None) -> Peer:
-    """Install Overcooked-AI if it is not there yet, and start it.
+def open_peer(package: Package, folder: Path | None = None, arguments: Sequence[str] = ()) -> Peer:
+    """Install a peer if it is not there yet, and start it.
 
     Args:
-        folder: Where its environment lives; None means the user's cache folder.
+        package: The peer.
+        folder: Where the peers' environments live; None means the user's cache folder.
+        arguments: Of its program.
 
     Raises:
         PeerError: It cannot be installed or does not run.
     """
-    folder = folder or user_cache_path("legible-envs") / "peers" / "overcooked-ai"
-    python = folder / ("Scripts/python.exe" if sys.platform == "win32" else "bin/python")
-    marker = folder / "installed"
+    home = (folder or user_cache_path("legible-envs") / "peers") / package.name
+    python = home / ("Scripts/python.exe" if sys.platform == "win32" else "bin/python")
+    marker = home / "installed"
+    wanted = "".join(f"{each}\n" for together in package.requirements for each in together)
     try:
-        if not marker.exists():
-            venv.create(folder, with_pip=True, clear=folder.exists() and (folder / "pyvenv.cfg").exists())
-            _pip_install(python)
-            marker.write_text("\n".join(REQUIREMENTS) + "\n", encoding="utf-8")
-        return Peer(python)
+        if not marker.exists() or marker.read_text(encoding="utf-8") != wanted:
+            venv.create(home, with_pip=True, clear=(home / "pyvenv.cfg").exists())
+            for requirements in package.requirements:
+                _pip_install(python, requirements)
+            marker.write_text(wanted, encoding="utf-8")
+        return Peer(python, package, arguments)
     except OSError as error:
-        raise PeerError(f"no environment in {folder}: {error}") from error
+        raise PeerError(f"no environment in {home}: {error}") from error
     except subprocess.TimeoutExpired as error:
-        raise PeerError(f"installing {REQUIREMENTS[0]} took longer than {INSTALL_SECONDS} s") from error
+        raise PeerError(f"installing {package.name} took longer than {INSTALL_SECONDS} s") from error
 
 
-def _pip_install(python: Path) -> None:
-    command = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *REQUIREMENTS]
+def _pip_install(python: Path, requirements: Sequence[str]) -> None:
+    command = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *requirements]
     done = subprocess.run(command, capture_output=True, text=True, timeout=INSTALL_SECONDS, check=False)
     if done.returncode:
-        raise PeerError(f"pip could not install {REQUIREMENTS[0]}: {' '.join(done.stderr.strip().splitlines()[-1:])}")
+        raise PeerError(f"pip could not install {requirements[0]}: {' '.join(done.stderr.strip().splitlines()[-1:])}")
+
+
+@contextlib.contextmanager
+def opened(
+    packages: Mapping[Package, Sequence[str]], folder: Path | None, remarks: list[str], console: Console
+) -> Iterator[dict[str, Peer]]:
+    """Running peers by name while a benchmark lasts; those that cannot run are left out, with a remark that says why.
+
+    Args:
+        packages: The peers, and the arguments of their programs.
+        folder: See :func:`open_peer`.
+        remarks: Where remarks are added.
+        console: Where it is shown that something is being installed.
+    """
+    peers: dict[str, Peer] = {}
+    with contextlib.ExitStack() as stack:
+        for package, arguments in packages.items():
+            try:
+                with console.status(f"installing {package.name} into an environment of its own (once)"):
+                    peers[package.name] = open_peer(package, folder, arguments)
+                stack.callback(peers[package.name].close)
+            except PeerError as error:
+                remarks.append(f"{package.name} was not measured: {error}")
+        yield peers

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import subprocess
 import sys
@@ -14,9 +15,9 @@ import numpy as np
 
 from benchmarks.throughput.analysis import machine, result_table, to_markdown
 from benchmarks.throughput.measure import Figure, alternate, rate
-from benchmarks.throughput.peers import Peer, PeerError, open_peer
+from benchmarks.throughput.peers import IMITATION, IRL_MAXENT, OVERCOOKED_AI, Peer, opened
 from benchmarks.throughput.reaching import reaches
-from benchmarks.throughput.reading import reading
+from benchmarks.throughput.reading import evaluating, reading, save_problem
 from benchmarks.throughput.sweep import FULL, OPTIMUM_5X5, QUICK, Settings
 
 if TYPE_CHECKING:
@@ -39,21 +40,30 @@ def run_benchmark(
     Args:
         console: Where to print.
         quick: Rough figures, with few repeats.
-        peers: Whether to measure Overcooked-AI too.
-        peers_folder: Where its virtual environment lives; None means the user's cache folder.
+        peers: Whether to measure other packages too: Overcooked-AI, imitation and irl-maxent.
+        peers_folder: Where their virtual environments live; None means the user's cache folder.
         out: Markdown file to write.
         settings: Sizes and repeats; None means those of ``quick``.
     """
     settings = settings or (QUICK if quick else FULL)
     remarks = _busy()
     figures: list[Figure] = []
-    with _peer(peers, peers_folder, remarks, console) as peer:
+    if not peers:
+        remarks.append("Overcooked-AI, imitation and irl-maxent were not measured; --peers does.")
+    with tempfile.TemporaryDirectory() as scratch, contextlib.ExitStack() as stack:
+        running: dict[str, Peer] = {}
+        if peers:
+            problem = str(save_problem(Path(scratch)))
+            packages = {OVERCOOKED_AI: (), **{package: (package.name, problem) for package in (IMITATION, IRL_MAXENT)}}
+            running = stack.enter_context(opened(packages, peers_folder, remarks, console))
+        game = running.pop(OVERCOOKED_AI.name, None)
         groups: tuple[tuple[str, Callable[[], list[Figure]]], ...] = (
             ("scoring layouts", lambda: scoring(settings)),
             ("searching", lambda: searching(settings)),
-            ("playing", lambda: games(settings, peer)),
+            ("playing", lambda: games(settings, game)),
             ("reading reaches", lambda: reaches(settings)),
-            ("reading people", lambda: reading(settings)),
+            ("reading people", lambda: reading(settings, running, remarks)),
+            ("judging predictors", lambda: evaluating(settings)),
             ("starting", lambda: starting(settings)),
         )
         for name, measure in groups:
@@ -78,29 +88,6 @@ def _busy() -> list[str]:
         if load > cores / 2
         else []
     )
-
-
-class _peer:
-    """The peer's process while the benchmark runs, or None, with a remark that says why."""
-
-    def __init__(self, wanted: bool, folder: Path | None, remarks: list[str], console: Console) -> None:
-        self.wanted, self.folder, self.remarks, self.console = wanted, folder, remarks, console
-        self.peer: Peer | None = None
-
-    def __enter__(self) -> Peer | None:
-        if not self.wanted:
-            self.remarks.append("Overcooked-AI was not measured; --peers does.")
-            return None
-        try:
-            with self.console.status("installing Overcooked-AI into an environment of its own (once)"):
-                self.peer = open_peer(self.folder)
-        except PeerError as error:
-            self.remarks.append(f"Overcooked-AI was not measured: {error}")
-        return self.peer
-
-    def __exit__(self, *_: object) -> None:
-        if self.peer is not None:
-            self.peer.close()
 
 
 # -- scoring and searching ---------------------------------------------------------------------------------------------

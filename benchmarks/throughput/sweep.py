@@ -26,6 +26,8 @@ class Settings:
         search_evaluations: Budget of the search whose overhead is measured.
         num_envs: Size of the vector environment.
         fresh_starts: New processes for import and compile times.
+        walks: Walks that predictors are cross-validated on.
+        evaluations: How often.
     """
 
     rounds: int = 7
@@ -38,10 +40,13 @@ class Settings:
     search_evaluations: int = 200_000
     num_envs: int = 64
     fresh_starts: int = 5
+    walks: int = 500
+    evaluations: int = 2
 
 
 FULL: Final = Settings()
-QUICK: Final = Settings(rounds=3, seconds=0.1, oracle_layouts=1, seeds=2, search_evaluations=50_000, fresh_starts=1)
+QUICK: Final = Settings(rounds=3, seconds=0.1, oracle_layouts=1, seeds=2, search_evaluations=50_000, fresh_starts=1,
+                        evaluations=1)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -73,8 +78,14 @@ TARGETS: Final[dict[str, Target]] = {
     "gaussian velocity update": Target("<=", 1e-3),
     "maxent gradient": Target("<=", 0.3e-3),
     "maxent fit": Target("<=", 0.5),
+    "imitation / gradient": Target(">=", 100),
+    "irl-maxent / gradient": Target(">=", 300),
+    "evaluation": Target("<=", 10.0),
     "update Eq. 1": Target("<=", 100e-6),
     "update MaxEnt": Target("<=", 100e-6),
+    "update n-gram": Target("<=", 100e-6),
+    "update k-NN": Target("<=", 100e-6),
+    "update logistic": Target("<=", 100e-6),
     "import": Target("<=", 0.3),
     "compile": Target("<=", 20.0),
 }

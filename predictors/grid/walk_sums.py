@@ -63,34 +63,45 @@ def factorise(neighbours: Integers, steps: Floats, band: int) -> tuple[Floats, b
 @kernel
 def solve(factors: Floats, right: Floats) -> Floats:
     """``(I - W)^-1 right`` for ``(n, K)`` right-hand sides."""
-    n, band = len(factors), factors.shape[1] // 2
+    (n, count), band = right.shape, factors.shape[1] // 2
     x = right.copy()
+    # Loops instead of rows: the kernel compiler would make room for each row's product.
     for i in range(n):
         for j in range(max(0, i - band), i):
-            if factors[i, band + j - i] != 0.0:
-                x[i] -= factors[i, band + j - i] * x[j]
+            share = factors[i, band + j - i]
+            if share != 0.0:
+                for column in range(count):
+                    x[i, column] -= share * x[j, column]
     for i in range(n - 1, -1, -1):
         for j in range(i + 1, min(n, i + band + 1)):
-            if factors[i, band + j - i] != 0.0:
-                x[i] -= factors[i, band + j - i] * x[j]
-        x[i] /= factors[i, band]
+            share = factors[i, band + j - i]
+            if share != 0.0:
+                for column in range(count):
+                    x[i, column] -= share * x[j, column]
+        for column in range(count):
+            x[i, column] /= factors[i, band]
     return x
 
 
 @kernel
 def solve_transposed(factors: Floats, right: Floats) -> Floats:
     """``(I - W)^-T right`` for ``(n, K)`` right-hand sides."""
-    n, band = len(factors), factors.shape[1] // 2
+    (n, count), band = right.shape, factors.shape[1] // 2
     x = right.copy()
     for i in range(n):
         for j in range(max(0, i - band), i):
-            if factors[j, band + i - j] != 0.0:
-                x[i] -= factors[j, band + i - j] * x[j]
-        x[i] /= factors[i, band]
+            share = factors[j, band + i - j]
+            if share != 0.0:
+                for column in range(count):
+                    x[i, column] -= share * x[j, column]
+        for column in range(count):
+            x[i, column] /= factors[i, band]
     for i in range(n - 1, -1, -1):
         for j in range(i + 1, min(n, i + band + 1)):
-            if factors[j, band + i - j] != 0.0:
-                x[i] -= factors[j, band + i - j] * x[j]
+            share = factors[j, band + i - j]
+            if share != 0.0:
+                for column in range(count):
+                    x[i, column] -= share * x[j, column]
     return x
 
 

@@ -1,0 +1,107 @@
+"""Runs in the environment of imitation or irl-maxent, on the problem in the file named second.
+
+To "rate SECONDS" it answers with gradients per second, to "gradient" with the gradient itself. The problem, made by
+:func:`benchmarks.throughput.reading.save_problem`: ``next`` ``(n, 4)`` cells beside each cell (-1: none), ``goals``
+``(n, 4, K)`` whether that move enters a station, ``starts`` ``(K, n)`` how many walks to each station begin where,
+``visits`` ``(n,)`` how often cells were entered or begun in, ``rewards`` ``(n,)`` of the cells, ``horizon`` after how
+many steps walks end at the latest (imitation needs such a limit). Both packages know one task at a time: there is one
+for each station, with two states more. The station's is left for no other, and its reward of ``-log 4`` makes its four
+ways of staying weigh 1 together. Impossible moves lead to the last state, which is too expensive for anyone. Stated so,
+both compute the gradient that this project computes, which asks them for it to compare.
+"""
+
+import json
+import sys
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+DEAD = -300.0
+
+
+def tasks(problem: Any) -> Iterator[tuple[Any, Any, Any]]:
+    """For each station: ``(S, 4, S)`` transitions, ``(S,)`` number of walks that begin there, ``(S,)`` rewards."""
+    count = len(problem["next"])
+    for goal, starts in enumerate(problem["starts"]):
+        moves = np.zeros((count + 2, 4, count + 2))
+        for cell in range(count):
+            for move in range(4):
+                to = problem["next"][cell, move]
+                to = count if problem["goals"][cell, move, goal] else to if to >= 0 else count + 1
+                moves[cell, move, to] = 1.0
+        moves[count, :, count] = moves[count + 1, :, count + 1] = 1.0
+        yield moves, np.r_[starts, 0.0, 0.0], np.r_[problem["rewards"], -np.log(4.0), DEAD]
+
+
+def with_imitation(problem: Any) -> Callable[[], Any]:
+    """The gradient as ``MCEIRL`` computes it before each step of its optimiser."""
+    from imitation.algorithms.mce_irl import mce_occupancy_measures  # type: ignore[import-not-found]
+    from seals.base_envs import TabularModelPOMDP  # type: ignore[import-not-found]
+
+    made = []
+    for moves, starts, reward in tasks(problem):
+        env = TabularModelPOMDP(
+            transition_matrix=moves,
+            observation_matrix=np.eye(len(moves)),
+            reward_matrix=reward,
+            horizon=int(problem["horizon"]),
+            initial_state_dist=starts / starts.sum(),
+        )
+        made.append((env, starts.sum(), reward))
+    visits = problem["visits"]
+
+    def gradient() -> Any:
+        expected = np.zeros(len(visits))
+        for env, weight, reward in made:
+            expected += weight * mce_occupancy_measures(env, reward=reward)[1][: len(visits)]
+        return visits - expected
+
+    return gradient
+
+
+def with_irl_maxent(problem: Any) -> Callable[[], Any]:
+    """The gradient as ``irl`` computes it before each step of its optimiser."""
+    from irl_maxent.maxent import compute_expected_svf  # type: ignore[import-not-found]
+
+    # It wants transitions as (from, to, action).
+    # It needs no state for impossible moves: transitions without any probability do.
+    made = [
+        (np.moveaxis(moves, 1, 2)[:-1, :-1].copy(), starts[:-1], reward[:-1])
+        for moves, starts, reward in tasks(problem)
+    ]
+    visits = problem["visits"]
+
+    def gradient() -> Any:
+        expected = np.zeros(len(visits))
+        for moves, starts, reward in made:
+            weight = starts.sum()
+            svf = compute_expected_svf(moves, starts / weight, [len(visits)], reward)
+            expected += weight * svf[: len(visits)]
+        return visits - expected
+
+    return gradient
+
+
+def main() -> None:
+    """Answer requests until there are no more."""
+    make = {"imitation": with_imitation, "irl-maxent": with_irl_maxent}[sys.argv[1]]
+    with np.load(sys.argv[2]) as file:
+        gradient = make({name: file[name] for name in file.files})
+    gradient()
+    print("ready", flush=True)
+    for line in sys.stdin:
+        if line.startswith("gradient"):
+            print("gradient", json.dumps(gradient().tolist()), flush=True)
+            continue
+        seconds, done, start, passed = float(line.split()[1]), 0, time.process_time(), 0.0
+        while passed < seconds or not done:
+            gradient()
+            done += 1
+            passed = time.process_time() - start
+        print("rate", done / passed, flush=True)
+
+
+if __name__ == "__main__":
+    main()
