@@ -1,0 +1,212 @@
+"""The file of a sweep, and the cells it stands for."""
+
+from __future__ import annotations
+
+import itertools
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, NamedTuple, get_args
+
+from legible_envs.workspace import ObjectiveName, make_workspace
+
+__all__ = ["Named", "Sweep", "SweepError", "Variant"]
+
+_KEYS: Final = ("name", "seeds", "evaluations", "objectives", "workspaces", "emitters", "predictors", "people")
+
+
+class SweepError(ValueError):
+    """The file of a sweep asks for something that cannot be run; the message names the entry."""
+
+
+class Named(NamedTuple):
+    """One entry of an axis: what tables call it, and its settings."""
+
+    label: str
+    settings: dict[str, Any]
+
+
+class Variant(NamedTuple):
+    """A cell and what tables call its settings."""
+
+    labels: dict[str, Any]
+    cell: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """Every combination of workspace, objective, emitter, number of evaluations and seed.
+
+    Attributes:
+        name: Its name, also that of its default folder.
+        workspaces: Settings of :func:`~legible_envs.workspace.make_workspace`.
+        emitters: ``emitter`` (a name or ``"module:Class"``) and its options.
+        objectives: Names.
+        evaluations: Budgets.
+        seeds: One search each.
+        predictors: Who reads simulated people in the best layout of every search; none by default.
+        people: ``participants`` (8) and what the workspace's ``simulate`` takes.
+
+    Example:
+        >>> sweep = Sweep.from_dict({"workspaces": [{"workspace": "overcooked", "shape": [5, 5]}], "seeds": 3})
+        >>> len(list(sweep.variants()))
+        3
+    """
+
+    name: str
+    workspaces: tuple[Named, ...]
+    emitters: tuple[Named, ...]
+    objectives: tuple[str, ...]
+    evaluations: tuple[int, ...]
+    seeds: tuple[int, ...]
+    predictors: tuple[str, ...] = ()
+    people: Mapping[str, Any] | None = None
+
+    @classmethod
+    def from_toml(cls, path: str | Path) -> Sweep:
+        """Read a file.
+
+        Raises:
+            SweepError: It is not TOML, or asks for what cannot be run.
+            FileNotFoundError: It does not exist.
+        """
+        path = Path(path)
+        try:
+            data = tomllib.loads(path.read_text(encoding="utf-8"))
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            raise SweepError(f"{path} is not TOML: {error}") from error
+        try:
+            return cls.from_dict({"name": path.stem} | data)
+        except SweepError as error:
+            raise SweepError(f"{path}: {error}") from error
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Sweep:
+        """Build a sweep from plain data, and check everything that can be checked without running it.
+
+        Args:
+            data: ``workspaces`` (names or mappings with ``workspace``), and optionally ``name``, ``emitters`` (names
+                or mappings with ``emitter``; default ``"improve"``), ``objectives``, ``evaluations``, ``seeds`` (a
+                number of seeds from 0, or a list), ``predictors`` and ``people``. Mappings may have a ``label``.
+
+        Raises:
+            SweepError: Unknown keys, unknown names, settings that a workspace or an emitter refuses.
+        """
+        unknown = sorted(set(data) - set(_KEYS))
+        if unknown or not data.get("workspaces"):
+            raise SweepError(
+                f"a sweep needs `workspaces` and knows the keys {list(_KEYS)}"
+                + (f"; unknown: {unknown}" if unknown else "; `workspaces` is missing or empty")
+            )
+        seeds = data.get("seeds", 1)
+        sweep = cls(
+            name=str(data.get("name", "sweep")),
+            workspaces=_axis(data["workspaces"], "workspace"),
+            emitters=_axis(data.get("emitters", ["improve"]), "emitter"),
+            objectives=tuple(_listed(data.get("objectives", ["legibility"]), str, "objectives")),
+            evaluations=tuple(_listed(data.get("evaluations", [100_000]), int, "evaluations")),
+            seeds=tuple(range(seeds)) if type(seeds) is int else tuple(_listed(seeds, int, "seeds")),
+            predictors=tuple(_listed(data.get("predictors", []), str, "predictors")),
+            people=data.get("people"),
+        )
+        sweep._check()
+        return sweep
+
+    def variants(self) -> Iterator[Variant]:
+        """All cells, seeds fastest."""
+        axes = (self.workspaces, self.objectives, self.emitters, self.evaluations, self.seeds)
+        for workspace, objective, emitter, evaluations, seed in itertools.product(*axes):
+            labels = {
+                "workspace": workspace.label,
+                "objective": objective,
+                "emitter": emitter.label,
+                "evaluations": evaluations,
+                "seed": seed,
+            }
+            cell: dict[str, Any] = {
+                "workspace": workspace.settings,
+                "objective": objective,
+                "emitter": emitter.settings,
+                "evaluations": evaluations,
+                "seed": seed,
+            }
+            if self.predictors:
+                cell |= {"predictors": list(self.predictors), "people": dict(self.people or {})}
+            yield Variant(labels, cell)
+
+    def _check(self) -> None:
+        from optimizers import make_archive, make_emitter
+        from predictors.registry import make_predictor
+
+        for what, values in (("objectives", self.objectives), ("evaluations", self.evaluations), ("seeds", self.seeds)):
+            if not values:
+                raise SweepError(f"`{what}` is empty; nothing would be run")
+        unknown = [name for name in self.objectives if name not in get_args(ObjectiveName)]
+        if unknown:
+            raise SweepError(f"unknown objectives {unknown}; there are {list(get_args(ObjectiveName))}")
+        if min(self.evaluations) < 1:
+            raise SweepError(f"`evaluations` must be at least 1, got {min(self.evaluations)}")
+        if self.people is not None and not isinstance(self.people, Mapping):
+            raise SweepError(f"`people` must be a table, got {self.people!r}")
+        for label, settings in self.workspaces:
+            try:
+                workspace = make_workspace(settings)
+                for emitter, options in self.emitters:
+                    _try(
+                        f"emitter {emitter!r}",
+                        lambda w=workspace, o=options: make_emitter(
+                            o["emitter"], make_archive(w, seed=0), w, seed=0, options=_without(o, "emitter")
+                        ),
+                    )
+            except (ValueError, TypeError) as error:
+                raise SweepError(f"workspace {label!r}: {error}") from error
+        for name in self.predictors:
+            _try(f"predictor {name!r}", lambda name=name: make_predictor(name))
+
+
+def _try(what: str, make: Any) -> None:
+    try:
+        make()
+    except (ValueError, RuntimeError, ImportError) as error:
+        raise SweepError(f"{what}: {error}") from error
+
+
+def _without(settings: Mapping[str, Any], key: str) -> dict[str, Any]:
+    return {name: value for name, value in settings.items() if name != key}
+
+
+def _axis(entries: Any, key: str) -> tuple[Named, ...]:
+    """Entries of an axis: names or mappings, labelled so that tables can tell them apart."""
+    found = []
+    for number, entry in enumerate([entries] if isinstance(entries, str | Mapping) else list(entries), 1):
+        settings = {key: entry} if isinstance(entry, str) else dict(entry) if isinstance(entry, Mapping) else {}
+        if not isinstance(settings.get(key), str):
+            raise SweepError(
+                f"entry {number} of `{key}s` must be a name or a table with the key `{key}`, got {entry!r}"
+            )
+        label = settings.pop("label", None)
+        found.append(Named(str(label) if label is not None else _label(settings, key), settings))
+    labels = [name.label for name in found]
+    repeated = sorted({label for label in labels if labels.count(label) > 1})
+    if repeated or not found:
+        raise SweepError(f"`{key}s` " + (f"has {repeated} more than once; add `label`" if found else "is empty"))
+    return tuple(found)
+
+
+def _label(settings: Mapping[str, Any], key: str) -> str:
+    """Like ``overcooked shape=7x7 prefix=sum``."""
+    shown = (
+        f"{name}={'x'.join(map(str, value)) if isinstance(value, list) else value}"
+        for name, value in settings.items()
+        if name != key
+    )
+    return " ".join((settings[key], *shown))
+
+
+def _listed(values: Any, kind: type, what: str) -> Sequence[Any]:
+    values = values if isinstance(values, list | tuple) else [values]
+    wrong = [value for value in values if type(value) is not kind]
+    if wrong:
+        raise SweepError(f"`{what}` must hold {'texts' if kind is str else 'integers'}, got {wrong[0]!r}")
+    return values
