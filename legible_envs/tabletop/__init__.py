@@ -7,10 +7,14 @@ from legible_envs.tabletop.task import TabletopTask
 from legible_envs.tabletop.things import Table, TableObject, VirtualObstacle
 
 if TYPE_CHECKING:
+    from legible_envs.tabletop.belief import EqOneBelief
+    from legible_envs.tabletop.robot import RobotPartner
     from legible_envs.tabletop.scoring import TabletopScorer
     from legible_envs.tabletop.workspace import TabletopWorkspace
 
 __all__ = [
+    "EqOneBelief",
+    "RobotPartner",
     "Table",
     "TableObject",
     "TabletopLayout",
@@ -21,7 +25,12 @@ __all__ = [
 ]
 
 # Kernels need numba; the package must import without it.
-_LATE = {"TabletopScorer": "scoring", "TabletopWorkspace": "workspace"}
+_LATE = {
+    "EqOneBelief": "belief",
+    "RobotPartner": "robot",
+    "TabletopScorer": "scoring",
+    "TabletopWorkspace": "workspace",
+}
 
 
 def __getattr__(name: str) -> object:
