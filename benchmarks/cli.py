@@ -10,6 +10,8 @@ from typing import Any
 
 import click
 
+from benchmarks.human_play.command import judge
+from benchmarks.sweeping import sweep
 from legible_envs import __version__
 
 __all__ = ["main"]
@@ -52,14 +54,20 @@ def _message(error: Exception) -> str:
 def main(traceback: bool) -> None:
     """Design workspaces in which people's motion can be read.
 
-    LAYOUT is a file with an ASCII drawing, - for standard input, an Overcooked-AI .layout file, or the folder of a
-    search.
+    LAYOUT is a file with an ASCII drawing of a kitchen, the JSON of a table, - for standard input, an Overcooked-AI
+    .layout file, or the folder of a search.
     """
+
+
+main.add_command(sweep)
 
 
 _out = click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Folder to write to.")
 _layout = click.argument("layout", metavar="LAYOUT")
-_pots = click.option("--pots", type=click.IntRange(min=1), help="Soups in progress at once. [default: no limit]")
+_pots = click.option(
+    "--pots", type=click.IntRange(min=1), help="Kitchens: soups in progress at once. [default: no limit]"
+)
+_task = click.option("--task", metavar="NAME|FILE.yaml", help="Tables: what is built. [default: the one that fits]")
 
 
 class _Prefix(click.ParamType):
@@ -80,23 +88,34 @@ class _Prefix(click.ParamType):
 
 
 @main.command()
-@click.argument("domain", type=click.Choice(["overcooked"]))
-@click.option("--shape", nargs=2, type=click.IntRange(min=4), default=(7, 7), show_default=True, metavar="ROWS COLS")
+@click.argument("domain", type=click.Choice(["overcooked", "tabletop"]))
+@click.option("--shape", nargs=2, type=click.IntRange(min=4), default=(7, 7), show_default=True, metavar="ROWS COLS",
+              help="Kitchens: their size.")  # fmt: skip
+@click.option("--task", default="columns", show_default=True, metavar="NAME|FILE.yaml", help="Tables: what is built.")
+@click.option(
+    "--condition",
+    type=click.Choice(["all", "both", "placement", "obstacles"]),
+    default="all",
+    show_default=True,
+    help="Tables: what is designed; all searches each of the three.",
+)
 @click.option(
     "--objective",
     type=click.Choice(["legibility", "efficiency", "legible-efficient"]),
     default="legibility",
     show_default=True,
 )
-@click.option("--prefix", type=_Prefix(), default="mean", show_default=True, help="Which prefixes of a walk count.")
+@click.option("--prefix", type=_Prefix(), default="mean", show_default=True, help="Which prefixes of a reach count.")
 @_pots
 @click.option("--emitter", default="improve", show_default=True, metavar="NAME|MODULE:CLASS")
-@click.option("--evaluations", type=click.IntRange(min=1), default=200_000, show_default=True)
+@click.option("--evaluations", type=click.IntRange(min=1), help="Layouts to score. [default: 200000]")
+@click.option("--iterations", nargs=2, type=click.IntRange(min=0), metavar="RANDOM CLIMBS",
+              help="The paper's budget instead: random layouts, then climbs, each to its end.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
-@click.option("--max-distance", type=float, help="Refuse layouts whose task takes longer than this.")
-@click.option("--start-from", metavar="LAYOUT", help="Begin with this kitchen; it also sets the shape.")
-@click.option("--lock", multiple=True, metavar="STATION", help="Leave this station where it is; repeatable.")
-@click.option("--relocation-cost", type=float, default=0.0, help="What each moved station costs, in score.")
+@click.option("--max-distance", type=float, help="Refuse layouts whose task takes longer than this (steps, metres).")
+@click.option("--start-from", metavar="LAYOUT", help="Begin with this layout; a kitchen also sets the shape.")
+@click.option("--lock", multiple=True, metavar="STATION", help="Kitchens: leave this station where it is; repeatable.")
+@click.option("--relocation-cost", type=float, default=0.0, help="Kitchens: what each moved station costs, in score.")
 @click.option("--resume", is_flag=True, help="Continue the search in the --out folder, with its own settings.")
 @click.option("--overwrite", is_flag=True, help="Replace a search that lies in the --out folder.")
 @click.option("--quiet", is_flag=True, help="Show no progress bar.")
@@ -105,15 +124,19 @@ class _Prefix(click.ParamType):
 def optimize(ctx: click.Context, domain: str, out: Path | None, **settings: Any) -> None:
     """Search for layouts.
 
-    Writes the archive, curves, a picture and a report into the --out folder.
+    Writes the archive, curves, pictures and a report into the --out folder. For tables it searches what placing
+    objects, virtual obstacles, and both can do, one after the other.
     """
-    from benchmarks.searching import default_folder, resumed_settings, run_search
+    from benchmarks.searching import check_options, default_folder, run_search
 
     given = {name for name in settings if ctx.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT}
+    check_options(domain, given)
+    if {"evaluations", "iterations"} <= given:
+        raise click.UsageError("give either --evaluations or --iterations, not both")
     folder = out or default_folder(domain, settings)
-    if settings["resume"]:
-        settings = resumed_settings(folder, settings, given)
-    run_search(domain, folder, **settings)
+    if settings["evaluations"] is None and settings["iterations"] is None:
+        settings["evaluations"] = 200_000
+    run_search(domain, folder, settings, given)
 
 
 @main.command()
@@ -121,12 +144,11 @@ def optimize(ctx: click.Context, domain: str, out: Path | None, **settings: Any)
 def report(run: Path) -> None:
     """Write the report of a search anew.
 
-    RUN is its folder; the search may be finished or not. Writes report.html and best.png.
+    RUN is its folder; the search may be finished or not. Writes report.html and the pictures beside it.
     """
-    from benchmarks.report import write_best_image, write_report
+    from benchmarks.searching import write_pictures
 
-    write_best_image(run)
-    click.echo(f"report: {write_report(run)}")
+    click.echo(f"report: {write_pictures(run)['report']}")
 
 
 @main.command()
@@ -138,13 +160,14 @@ def emitters() -> None:
     say().print(table(emitter_rows()))
 
 
-# -- single kitchens ---------------------------------------------------------------------------------------------------
+# -- single layouts ----------------------------------------------------------------------------------------------------
 
 
 @main.command()
 @_layout
-@click.option("--prefix", type=_Prefix(), help="Which prefixes of a walk count. [default: mean, or the run's own]")
+@click.option("--prefix", type=_Prefix(), help="Which prefixes of a reach count. [default: mean, or the run's own]")
 @_pots
+@_task
 @click.option("--trajectories", type=click.Path(exists=True, dir_okay=False, path_type=Path),
               help="Walks (.npz, .csv, or a recorded play): also say how well predictors read them.")  # fmt: skip
 @click.option("--predictor", "predictors", multiple=True, metavar="NAME|MODULE:CLASS",
@@ -164,20 +187,21 @@ def score(
     layout: str,
     prefix: Any,
     pots: int | None,
+    task: str | None,
     trajectories: Path | None,
     predictors: tuple[str, ...],
     by_participant: bool,
     out: Path | None,
     **settings: Any,
 ) -> None:
-    """Score one kitchen exactly.
+    """Score one layout exactly.
 
     Prints legibility, distance, and what belongs beside them. With --predictor, judges predictors on the walks in the
     --trajectories file, and writes tables, figures and a page into the --out folder; where LAYOUT is the folder of a
     search, into its people folder, and a section into its report.
     """
     from benchmarks.inspecting import read_people, score_lines, walks_in
-    from benchmarks.kitchens import load_kitchen
+    from benchmarks.presenters import load_design
 
     given = [
         name
@@ -188,19 +212,19 @@ def score(
         raise click.UsageError("--predictor needs --trajectories: the walks to judge it on")
     if given and not predictors:
         raise click.UsageError(f"--{given[0].replace('_', '-')} is about --predictor, which is not given")
-    kitchen = load_kitchen(layout, prefix=prefix, pots=pots)
-    for line in score_lines(kitchen):
+    design = load_design(layout, prefix=prefix, pots=pots, task=task)
+    for line in score_lines(design):
         click.echo(line)
     if trajectories is None:
         return
     from benchmarks.console import say
 
     if not predictors:
-        read_people(say(), kitchen, trajectories)
+        read_people(say(), design, trajectories)
         return
     from benchmarks.people import print_reading, read_walks, save_reading
 
-    walks = walks_in(kitchen, trajectories)
+    walks = walks_in(design, trajectories)
     reading = read_walks(walks, predictors, groups="participant" if by_participant else None, **settings)
     print_reading(say(), reading)
     for line in save_reading(reading, layout, out):
@@ -209,19 +233,21 @@ def score(
 
 @main.command()
 @_layout
-@click.option("--prefix", type=_Prefix(), help="Which prefixes of a walk count. [default: mean, or the run's own]")
+@click.option("--prefix", type=_Prefix(), help="Which prefixes of a reach count. [default: mean, or the run's own]")
 @_pots
+@_task
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="Where to write the picture (.png).")
-def show(layout: str, prefix: Any, pots: int | None, out: Path | None) -> None:
-    """Draw a kitchen and explain its score.
+def show(layout: str, prefix: Any, pots: int | None, task: str | None, out: Path | None) -> None:
+    """Draw a layout and explain its score.
 
-    Which reaches win and lose it, and where goals are confused.
+    Which reaches win and lose it, and where goals are in doubt. For the search of a table draws the boards: the
+    baseline, the best layout of every condition, and the desired configuration.
     """
     from benchmarks.console import say
-    from benchmarks.inspecting import show_kitchen
-    from benchmarks.kitchens import load_kitchen
+    from benchmarks.inspecting import show_design
+    from benchmarks.presenters import load_design
 
-    show_kitchen(say(), load_kitchen(layout, prefix=prefix, pots=pots), out)
+    show_design(say(), load_design(layout, prefix=prefix, pots=pots, task=task), out)
 
 
 @main.command()
@@ -273,6 +299,9 @@ def stats(folder: Path | None) -> None:
     from legible_envs.overcooked.recordings import recording_stats
 
     say().print(table(recording_stats(folder)))
+
+
+humans.add_command(judge)
 
 
 @main.command()

@@ -1,4 +1,4 @@
-"""What the command line prints: kitchens in colour, several side by side, and small tables."""
+"""What the command line prints: kitchens and tabletops in colour, several side by side, and tables of numbers."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ if TYPE_CHECKING:
 
     from benchmarks.report import Condition
     from legible_envs.overcooked.layout import OvercookedLayout
+    from legible_envs.tabletop import TabletopLayout
 
-__all__ = ["board", "board_for", "boards", "number", "say", "table"]
+__all__ = ["board", "board_for", "boards", "number", "say", "table", "table_text"]
 
 _PLAIN = {"X": "##", "V": "[]", " ": "  "}
 _FANCY = {"X": "▒▒", "V": "[]", " ": "  "}
@@ -65,6 +66,69 @@ def _ink(ground: str) -> str:
 def board_for(console: Console, layout: OvercookedLayout) -> Text:
     """A kitchen in the characters that this console can show."""
     return board(layout, fancy=console.encoding.lower().startswith("utf"))
+
+
+_ON_TOP = {"circle": "●", "triangle": "▲", "square": "■", "star": "★", "diamond": "◆", "heart": "♥", "plus": "✚"}
+_COLUMN, _LINE = 0.02, 0.04  # metres of a character of a tabletop
+
+
+def table_text(console: Console, layout: TabletopLayout) -> Text:
+    """A tabletop as a map of characters, 2 cm by 4 cm each, in the colours of its drawings.
+
+    Objects are two characters with their shape, or its initial where the console shows plain characters only; virtual
+    obstacles are ``##``, starts of the hand ``o``.
+    """
+    from rich.text import Text
+
+    from legible_envs.tabletop.rendering.palette import TABLE, hex_of
+
+    fancy = console.encoding.lower().startswith("utf")
+    width, depth = layout.table.size
+    columns, lines = round(width / _COLUMN), round(depth / _LINE)
+    cells = [[(" ", f"on {_ground(layout, c, lines - 1 - r)}") for c in range(columns)] for r in range(lines)]
+
+    def put(x: float, y: float, text: str, style: str) -> None:
+        row, column = lines - 1 - int(min(y / _LINE, lines - 1)), round(x / _COLUMN - len(text) / 2)
+        for i, symbol in enumerate(text):
+            if 0 <= column + i < columns and 0 <= row < lines:
+                cells[row][column + i] = symbol, style
+
+    for x, y in layout.table.starts.values():
+        put(x, y, "o", f"bold {TABLE['start']} on {TABLE['top']}")
+    for obstacle in layout.obstacles:
+        for x, y in _along(obstacle.at, obstacle.angle, obstacle.size[0]):
+            put(x, y, "▒" if fancy else "#", f"{TABLE['obstacle_edge']} on {TABLE['obstacle']}")
+    for thing in layout.objects:
+        colour, letter = hex_of(thing.colour), thing.shape[0].upper()
+        symbol = _ON_TOP.get(thing.shape, letter) if fancy else letter
+        put(*thing.at, f"{symbol} " if fancy else f"{symbol}{thing.colour[0]}", f"bold {_ink(colour)} on {colour}")
+    text = Text(no_wrap=True)
+    for i, line in enumerate(cells):
+        text.append("\n" if i else "")
+        for symbol, style in line:
+            text.append(symbol, style=style)
+    return text
+
+
+def _ground(layout: TabletopLayout, column: int, line: int) -> str:
+    """The colour under a character."""
+    from legible_envs.tabletop.rendering.palette import TABLE
+
+    x, y = (column + 0.5) * _COLUMN, (line + 0.5) * _LINE
+    for name in ("region", "assembly"):
+        x0, y0, x1, y1 = getattr(layout.table, name)
+        if x0 <= x <= x1 and y0 <= y <= y1:
+            return TABLE[name]
+    return TABLE["top"]
+
+
+def _along(at: tuple[float, float], angle: float, length: float) -> list[tuple[float, float]]:
+    """Points every centimetre along an obstacle."""
+    import math
+
+    count = max(2, round(length / 0.01))
+    steps = [length * (i / (count - 1) - 0.5) for i in range(count)]
+    return [(at[0] + s * math.cos(angle), at[1] + s * math.sin(angle)) for s in steps]
 
 
 def boards(console: Console, conditions: Sequence[Condition]) -> Table:

@@ -13,16 +13,15 @@ from dataclasses import dataclass
 from datetime import datetime
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from benchmarks.inspecting import loss_row
 from benchmarks.people import FOLDER, reading_section
+from benchmarks.presenters import Presenter, presenter_of
 from benchmarks.runs import Run, read_run
 from legible_envs.files import write_atomically
-
-if TYPE_CHECKING:
-    from legible_envs.overcooked.layout import OvercookedLayout
 
 __all__ = ["Condition", "report_data", "write_best_image", "write_report"]
 
@@ -32,6 +31,8 @@ LAYOUT_BYTES = 150_000
 """And at most so many bytes of layouts, so that large kitchens do not outgrow the page."""
 MAX_ROWS, MAX_COLUMNS = 80, 120
 """Finer archives are drawn with several cells in one, each showing the best of them."""
+WORST_ROWS, BEST_ROWS = 10, 3
+"""Reaches of the best layout that are listed."""
 MAX_POINTS = 240
 """Points of a search curve; longer histories are thinned."""
 
@@ -44,17 +45,19 @@ class Condition:
         name: What it is called, such as ``"random"``.
         layout: A layout that stands for it.
         score: Its legibility.
-        distance: Expected floor moves of the whole task.
+        distance: Expected floor moves, or metres, of the whole task.
         normalised: Legibility as a share of the highest conceivable, at most 1.
         note: One sentence on how the layout was chosen.
+        detour: Mean length of a reach over its straight line, on a table.
     """
 
     name: str
-    layout: OvercookedLayout
+    layout: Any
     score: float
     distance: float
     normalised: float | None = None
     note: str = ""
+    detour: float | None = None
 
 
 def write_report(
@@ -69,7 +72,7 @@ def write_report(
 
     Args:
         run_folder: The folder of a finished, interrupted or running search.
-        conditions: Layouts to show side by side; None leaves the section out.
+        conditions: Layouts to show side by side; None shows what the run itself compares, if anything.
         recorded_play: How predictors read recorded people (see :func:`benchmarks.demo.recorded_play`): ``note``,
             ``fractions``, ``curves`` (each ``label``, ``values``) and ``table`` (``columns``, ``rows``). None leaves
             the section out; a mapping with only a ``note`` says why there is none.
@@ -82,19 +85,25 @@ def write_report(
     """
     run = read_run(run_folder)
     path = run.folder / "report.html"
-    page = _render(report_data(run, conditions, recorded_play), reading_section(run.folder / FOLDER) or "")
+    presenter = _presenter(run)
+    data = report_data(run, conditions, recorded_play)
+    page = _render(data, presenter, _reaches(run), reading_section(run.folder / FOLDER) or "")
     write_atomically(path, lambda stream: stream.write(page.encode()))
     return path
 
 
-def write_best_image(run_folder: str | Path, *, tile: int = 64) -> Path:
-    """Write ``best.png``, a drawing of the run's best layout, into its folder."""
-    from legible_envs.overcooked.rendering import draw_layout, save_png
+def write_best_image(run_folder: str | Path, **options: Any) -> Path:
+    """Write ``best.png``, a drawing of the run's best layout, into its folder; ``options`` are those of the drawing."""
+    from legible_envs.drawing import save_png
 
     run = read_run(run_folder)
     path = run.folder / "best.png"
-    save_png(path, draw_layout(run.workspace.decode(run.best_genome), tile=tile))
+    save_png(path, _presenter(run).draw(run.workspace.decode(run.best_genome), run.workspace, **options))
     return path
+
+
+def _presenter(run: Run) -> Presenter:
+    return presenter_of(str(run.config["workspace"].get("workspace")))
 
 
 def report_data(
@@ -103,19 +112,22 @@ def report_data(
     recorded_play: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Everything the page shows, as JSON-ready data; this is also what its download button saves."""
-    config = run.config
+    config, presenter = run.config, _presenter(run)
     rows, columns = (int(n) for n in config["archive"]["dims"])
+    found = presenter.conditions(run) if conditions is None else conditions
     return {
-        "schema": 1,
-        "shape": list(run.workspace.decode(run.best_genome).shape),
+        "schema": 2,
+        "workspace": presenter.name,
+        "place": presenter.place(run.workspace),
+        "words": presenter.words,
         "objective": dict(config["objective"]),
-        "best": _best(run),
+        "best": _best(run, presenter),
         "axes": _axes(run, rows, columns),
-        "cells": _cells(run, rows, columns),
+        "cells": _cells(run, presenter, rows, columns),
         "archive_size": len(run.solution),
         "archive_dims": [rows, columns],
         "history": _history(run),
-        "conditions": [_condition(c) for c in conditions or ()],
+        "conditions": [_condition(c, presenter, run.workspace) for c in found],
         "recorded_play": _plain({**_NO_PLAY, **recorded_play}) if recorded_play else None,
         "config": {key: value for key, value in config.items() if key != "result"},
         "result": {key: _plain(value) for key, value in (config.get("result") or {}).items() if key != "best_genome"},
@@ -128,32 +140,45 @@ _NO_PLAY: dict[str, Any] = {"note": "", "fractions": [], "curves": [], "table": 
 # -- the parts of the data ---------------------------------------------------------------------------------------------
 
 
-def _best(run: Run) -> dict[str, Any]:
+def _best(run: Run, presenter: Presenter) -> dict[str, Any]:
     genome = run.best_genome
     summary = {key: _plain(value) for key, value in run.workspace.summary(genome).items()}
-    return {**summary, "layout": _one_line(run.workspace.decode(genome))}
+    return {**summary, "layout": presenter.encode(run.workspace.decode(genome))}
 
 
 def _axes(run: Run, rows: int, columns: int) -> list[dict[str, Any]]:
     """Names and labels of both axes; ``step`` is how many archive cells share one drawn cell.
 
-    Rows above the last one with a layout in it are left out: rooms allow far fewer obstacles than they have cells.
+    Rows beyond the first and the last one with a layout in it are left out: rooms allow far fewer obstacles than they
+    have cells, and tables no objects that all lie far apart.
     """
-    names = run.config["archive"].get("measure_names") or ["first measure", "second measure"]
+    archive = run.config["archive"]
+    names = archive.get("measure_names") or ["first measure", "second measure"]
     filled = min(rows, int(run.index.max()) // columns + 2) if len(run.index) else rows
     order_names = list(getattr(run.workspace, "order_names", ()))
     axes = []
-    for name, count, whole, most, labels in (
-        (names[0], filled, rows, MAX_ROWS, None),
-        (names[1], columns, columns, MAX_COLUMNS, order_names if len(order_names) == columns else None),
+    for i, (name, count, whole, most, labels) in enumerate(
+        (
+            (names[0], filled, rows, MAX_ROWS, None),
+            (names[1], columns, columns, MAX_COLUMNS, order_names if len(order_names) == columns else None),
+        )
     ):
         step = math.ceil(whole / most)
-        shown = [str(labels[i] if labels else i) for i in range(0, count, step)]
+        low, high = archive["ranges"][i] if "ranges" in archive else (-0.5, whole - 0.5)
+        shown = [str(labels[n]) if labels else _cell_label(low, high, whole, n) for n in range(0, count, step)]
         axes.append({"name": str(name), "count": len(shown), "step": step, "labels": shown, "whole": whole})
     return axes
 
 
-def _cells(run: Run, rows: int, columns: int) -> list[list[Any]]:
+def _cell_label(low: float, high: float, count: int, n: int) -> str:
+    """The number in the middle of a cell that holds one, else the cell's lower edge."""
+    width = (high - low) / count
+    if math.isclose(width, 1.0) and math.isclose(low % 1.0, 0.5):
+        return str(round(low + 0.5) + n)
+    return f"{low + n * width:.{max(0, math.ceil(-math.log10(width) - 1e-9))}f}"
+
+
+def _cells(run: Run, presenter: Presenter, rows: int, columns: int) -> list[list[Any]]:
     """The archive as ``[row, column, objective, legibility, distance, layout or None]``, best first."""
     steps = (math.ceil(rows / MAX_ROWS), math.ceil(columns / MAX_COLUMNS))
     drawn: dict[tuple[int, int], int] = {}
@@ -164,15 +189,14 @@ def _cells(run: Run, rows: int, columns: int) -> list[list[Any]]:
         return []
     genomes = run.solution[list(drawn.values())]
     legibility, distance = run.workspace.legibility(genomes), run.workspace.distance(genomes)
-    height, width = run.workspace.decode(genomes[0]).shape
-    carried = min(MAX_LAYOUTS, LAYOUT_BYTES // (height * width + 3))
+    carried = min(MAX_LAYOUTS, presenter.carried(run.workspace, LAYOUT_BYTES))
     return [
         [
             *cell,
             _plain(run.objective[i]),
             _plain(legibility[n]),
             _plain(distance[n]),
-            _one_line(run.workspace.decode(genomes[n])) if n < carried else None,
+            presenter.encode(run.workspace.decode(genomes[n])) if n < carried else None,
         ]
         for n, (cell, i) in enumerate(drawn.items())
     ]
@@ -187,23 +211,24 @@ def _history(run: Run) -> dict[str, list[float | None]]:
     return {name: [_plain(v) for v in run.history[name][picked]] for name in names}
 
 
-def _condition(condition: Condition) -> dict[str, Any]:
+def _condition(condition: Condition, presenter: Presenter, workspace: Any) -> dict[str, Any]:
     return {
         "name": condition.name,
         "note": condition.note,
-        "layout": _one_line(condition.layout),
-        "shape": list(condition.layout.shape),
+        "layout": presenter.encode(condition.layout),
+        "ways": presenter.ways(workspace, condition.layout),
         "score": _plain(condition.score),
         "distance": _plain(condition.distance),
         "normalised": _plain(condition.normalised),
+        "detour": _plain(condition.detour),
     }
 
 
-def _one_line(layout: OvercookedLayout) -> str:
-    """The drawing without line breaks and players: ``H * W`` symbols."""
-    from legible_envs.overcooked.layout import SYMBOLS
-
-    return "".join(SYMBOLS[code] for code in layout.cells.ravel())
+def _reaches(run: Run) -> list[dict[str, Any]]:
+    """Where the best layout loses and wins most, in words."""
+    rows = run.workspace.explain(run.best_genome)
+    worst, best = rows[:WORST_ROWS], rows[WORST_ROWS:][-BEST_ROWS:]
+    return [{str(key): value for key, value in loss_row(row).items()} for row in (*worst, *best)]
 
 
 def _plain(value: Any) -> Any:
@@ -226,28 +251,36 @@ def _plain(value: Any) -> Any:
 # -- the page ----------------------------------------------------------------------------------------------------------
 
 
-def _render(data: dict[str, Any], people: str = "") -> str:
+def _render(data: dict[str, Any], presenter: Presenter, reaches: list[dict[str, Any]], people: str = "") -> str:
     from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
     from legible_envs.overcooked.rendering.palette import PALETTE
 
     folder = files("benchmarks") / "templates"
+
+    def part(name: str) -> Markup:
+        return Markup((folder / name).read_text(encoding="utf-8"))
+
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters["number"] = _number
     template = environment.from_string((folder / "report.html.j2").read_text(encoding="utf-8"))
     return template.render(
-        title=_title(data),
-        lede=_lede(data),
-        figures=_figures(data),
+        title=presenter.title(data),
+        lede=_lede(data, presenter),
+        figures=_figures(data, presenter),
         palette=PALETTE,
         data=data,
+        words=presenter.words,
+        reaches=reaches,
         people=Markup(people),
         best=data["best"],
         settings=_settings(data["config"]),
         created=_date(data["config"].get("created")),
-        style=Markup((folder / "report.css").read_text(encoding="utf-8")),
-        script=Markup((folder / "report.js").read_text(encoding="utf-8")),
+        style=part("report.css"),
+        icons=part(presenter.icons) if presenter.icons else "",
+        drawing=part(presenter.script),
+        script=part("report.js"),
         payload=Markup(_json_for_script(data)),
     )
 
@@ -258,46 +291,45 @@ def _json_for_script(data: dict[str, Any]) -> str:
     return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
 
 
-def _title(data: dict[str, Any]) -> str:
-    rows, columns = data["shape"]
-    return f"A search for {_WANTED.get(data['objective']['name'], 'good')} kitchens, {rows} × {columns}"
-
-
-_WANTED = {"legibility": "legible", "efficiency": "efficient", "legible-efficient": "legible and efficient"}
-
-
-def _lede(data: dict[str, Any]) -> str:
+def _lede(data: dict[str, Any], presenter: Presenter) -> str:
     """What was found, in two sentences."""
-    best, conditions = data["best"], {c["name"]: c for c in data["conditions"]}
-    score, steps = _number(best.get("score")), _number(best.get("distance"), 1)
+    best, conditions = data["best"], {c["name"].lower(): c for c in data["conditions"]}
+    digits, unit = presenter.words["distance_digits"], presenter.words["distance_unit"]
+
+    def way(value: Any) -> str:
+        return f"{_number(value, digits)} {unit}"
+
+    score, length = _number(best.get("score")), way(best.get("distance"))
     if data["objective"]["name"] == "efficiency":
-        text = f"The task of the best kitchen found takes {steps} steps on average; its legibility is {score}."
+        text = f"The task of the best {presenter.thing} found takes {length} on average; its legibility is {score}."
     else:
-        text = f"The best kitchen found scores {score} in legibility"
+        text = f"The best {presenter.thing} found scores {score} in legibility"
         bounded = data["config"]["workspace"].get("prefix") != "sum"
         if bounded and (best.get("normalised") or -1) > 0:
             text += f", {_number(100 * best['normalised'], 0)} % of the highest conceivable score"
-        text += f", and its task takes {steps} steps on average."
+        text += f", and its task takes {length} on average."
     if "random" in conditions:
         other = conditions["random"]
-        text += (
-            f" A median random one scores {_number(other['score'])} and takes {_number(other['distance'], 1)} steps."
-        )
+        text += f" A median random one scores {_number(other['score'])} and takes {way(other['distance'])}."
+    if "baseline" in conditions:
+        other = conditions["baseline"]
+        text += f" The sorted baseline scores {_number(other['score'])} and takes {way(other['distance'])}."
     cap = data["objective"].get("max_distance")
-    return text if cap is None else f"{text} Layouts above a distance of {_number(cap, 1)} were not allowed."
+    return text if cap is None else f"{text} Layouts above a distance of {way(cap)} were not allowed."
 
 
-def _figures(data: dict[str, Any]) -> list[tuple[str, str, str]]:
+def _figures(data: dict[str, Any], presenter: Presenter) -> list[tuple[str, str, str]]:
     """Key figures under the title: name, value, remark."""
     best, result, config = data["best"], data["result"], data["config"]
     filled, cells = data["archive_size"], math.prod(data["archive_dims"])
     evaluations = result.get("evaluations") or (data["history"].get("evaluations") or [None])[-1]
     single = best.get("single_goal_score")
-    bounded = config["workspace"].get("prefix") != "sum"
+    bounded, words = config["workspace"].get("prefix") != "sum", presenter.words
     return [
         ("Legibility", _number(best.get("score")), f"{_number(single)} of it from single-goal reaches"),
         ("Normalised", _number(best.get("normalised")), "of at most 1" if bounded else "per reach"),
-        ("Distance", _number(best.get("distance"), 1), "expected steps of one task"),
+        ("Distance", _number(best.get("distance"), words["distance_digits"]), words["distance"]),
+        *([("Mean detour", _number(best["mean_detour"]), "of the straight line")] if "mean_detour" in best else []),
         ("Evaluations", _number(evaluations, 0), f"seed {config.get('seed')}"),
         (
             "Archive",

@@ -10,141 +10,150 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from benchmarks.console import number
+from benchmarks.presenters import Part, Presenter, presenter_of
 from benchmarks.runs import RunError, is_run_folder, read_config
 
 if TYPE_CHECKING:
-    from legible_envs.overcooked import OvercookedLayout
     from optimizers import SearchResult
 
-__all__ = ["default_folder", "emitter_rows", "resumed_settings", "run_search"]
+__all__ = ["check_options", "default_folder", "emitter_rows", "run_search", "write_pictures"]
 
 
 def default_folder(domain: str, settings: Mapping[str, Any]) -> Path:
     """Where a search is written that names no folder."""
     if settings.get("start_from"):
         return Path("runs") / f"{domain}-from-{Path(settings['start_from']).stem}-seed{settings['seed']}"
-    rows, columns = settings["shape"]
-    return Path("runs") / f"{domain}-{rows}x{columns}-{settings['objective']}-seed{settings['seed']}"
+    return Path("runs") / f"{domain}-{presenter_of(domain).folder_name(settings)}-seed{settings['seed']}"
 
 
-def resumed_settings(folder: Path, settings: Mapping[str, Any], given: Collection[str]) -> dict[str, Any]:
-    """Settings of a search that is continued: its own, except those given anew (which it may refuse).
+def check_options(domain: str, given: Collection[str]) -> None:
+    """Refuse options that are about another workspace.
 
     Raises:
-        RunError: The folder holds no run.
+        click.UsageError: One was given.
     """
-    config = read_config(folder / "config.json")
-    workspace = config["workspace"]
-    own = {
-        "shape": tuple(workspace.get("shape", settings["shape"])),
-        "prefix": workspace.get("prefix", settings["prefix"]),
-        "pots": workspace.get("pots"),
-        "objective": config["objective"]["name"],
-        "max_distance": config["objective"].get("max_distance"),
-        "start_from": workspace.get("start_from"),
-        "lock": tuple(workspace.get("locked") or ()),
-        "relocation_cost": workspace.get("relocation_cost", 0.0),
-        "emitter": config["emitter"]["name"],
-        "evaluations": config.get("evaluations", settings["evaluations"]),
-        "seed": config.get("seed", settings["seed"]),
-    }
-    return {name: value if name in given else own.get(name, value) for name, value in settings.items()}
+    from benchmarks.presenters import DOMAINS
+
+    for other in DOMAINS:
+        if other != domain:
+            wrong = sorted((presenter_of(other).options - presenter_of(domain).options) & set(given))
+            if wrong:
+                thing = presenter_of(other).thing
+                raise click.UsageError(f"--{wrong[0].replace('_', '-')} is about a {thing}, not about {domain}")
 
 
-def run_search(
-    domain: str,
-    out: Path,
-    *,
-    shape: tuple[int, int],
-    prefix: Any,
-    pots: int | None,
-    objective: str,
-    emitter: str,
-    evaluations: int,
-    seed: int,
-    max_distance: float | None,
-    start_from: str | None,
-    lock: tuple[str, ...],
-    relocation_cost: float,
-    resume: bool,
-    overwrite: bool,
-    quiet: bool,
-) -> None:
+def run_search(domain: str, out: Path, settings: Mapping[str, Any], given: Collection[str]) -> None:
     """Search, then write ``best.png`` and ``report.html`` beside what the search itself writes.
 
+    Args:
+        domain: Name of the workspace.
+        out: Folder of the run.
+        settings: Options of ``legible optimize``.
+        given: Names of those that the user gave; the others do not count where a search is continued.
+
     Raises:
-        RunError: The folder already holds a run, and nobody said what to do with it.
+        RunError: The folder already holds a run, and nobody said what to do with it, or none to be continued.
         SearchError: Its checkpoint cannot be continued, or the search cannot go on.
     """
-    from legible_envs.workspace import make_workspace
-    from optimizers import SearchInterrupted, search
-
-    if is_run_folder(out) and not (resume or overwrite):
+    presenter = presenter_of(domain)
+    if is_run_folder(out) and not (settings["resume"] or settings["overwrite"]):
         raise RunError(
             f"{out} already holds a search: add --resume to continue it, --overwrite to replace it, or choose another "
             "folder with --out"
         )
-    design: dict[str, Any] = {"shape": shape, "prefix": prefix, "pots": pots}
-    if start_from is not None:
-        kitchen = _existing_kitchen(start_from)
-        design |= {"shape": kitchen.shape, "start_from": kitchen.to_ascii(), "relocation_cost": relocation_cost}
-        design["locked"] = list(lock)
-    elif lock or relocation_cost:
-        raise click.UsageError("--lock and --relocation-cost need --start-from, the kitchen they are about")
-    workspace = make_workspace(domain, **design)
+    config: dict[str, Any] = {"workspace": domain}
+    if settings["resume"]:
+        before = read_config(out / "config.json")
+        config = dict(before["workspace"])
+        if config.get("workspace") != domain:
+            raise RunError(f"{out} holds a search of {config.get('workspace')!r}, not of {domain!r}")
+        settings = _continued(before, settings, given)
+    parts = presenter.parts({**config, **presenter.design(settings)}, settings, out)
+    results = [_search_part(domain, presenter, part, settings, out) for part in parts]
+    _tell(presenter, results[0], parts)
+
+
+def _continued(before: Mapping[str, Any], settings: Mapping[str, Any], given: Collection[str]) -> dict[str, Any]:
+    """Settings of a search that is continued: its own, except those given anew (which it may refuse)."""
+    always = {"resume", "overwrite", "quiet"}
+    kept = {name: value for name, value in settings.items() if name in given or name in always}
+    emitter = before["emitter"]
+    own: dict[str, Any] = {
+        "objective": before["objective"]["name"],
+        "max_distance": before["objective"].get("max_distance"),
+        "emitter": [one["name"] for one in emitter] if isinstance(emitter, list) else emitter["name"],
+        "seed": before.get("seed", settings["seed"]),
+    }
+    if not {"evaluations", "iterations"} & set(given):
+        own |= {"evaluations": before.get("evaluations"), "iterations": before.get("iterations")}
+    return {"evaluations": None, "iterations": None, **own, **kept}
+
+
+def _search_part(domain: str, presenter: Presenter, part: Part, settings: Mapping[str, Any], out: Path) -> SearchResult:
+    """One search of one folder."""
+    from optimizers import SearchInterrupted, search
+
+    if part.title and not settings["quiet"]:
+        click.echo(part.title, err=True)
+    iterations = settings.get("iterations")
     try:
         result = search(
-            workspace,
-            objective=objective,
-            max_distance=max_distance,
-            emitter=emitter,
-            evaluations=evaluations,
-            seed=seed,
-            checkpoint=out,
-            resume=resume,
-            overwrite=overwrite,
-            progress=False if quiet else None,
+            part.workspace,
+            objective=settings["objective"],
+            max_distance=settings["max_distance"],
+            emitter=settings["emitter"],
+            evaluations=settings["evaluations"],
+            iterations=None if iterations is None else (int(iterations[0]), int(iterations[1])),
+            seed=settings["seed"],
+            checkpoint=part.folder,
+            resume=("auto" if part.title else True) if settings["resume"] else False,
+            overwrite=settings["overwrite"],
+            progress=False if settings["quiet"] else None,
         )
     except SearchInterrupted as stop:
         done = 0 if stop.partial is None else stop.partial.evaluations
         click.echo(f"stopped after {done:,} evaluations; everything is saved in {out}", err=True)
         if stop.partial is not None and stop.partial.best_genome is not None:
-            _pictures(out)
+            write_pictures(part.folder)
         click.echo(f"to go on: legible optimize {domain} --resume --out {shlex.quote(str(out))}", err=True)
         raise click.exceptions.Exit(130) from None
-    _tell(result, out)
-
-
-def _existing_kitchen(start_from: str) -> OvercookedLayout:
-    """The kitchen of ``--start-from``; the manifest of a run holds the drawing itself."""
-    from benchmarks.kitchens import load_kitchen
-    from legible_envs.overcooked import OvercookedLayout
-
-    return OvercookedLayout.from_ascii(start_from) if "\n" in start_from else load_kitchen(start_from).layout
-
-
-def _tell(result: SearchResult, out: Path) -> None:
     if result.best_genome is None:
         click.echo(f"no layout scored in {result.evaluations:,} evaluations; is --max-distance too low?", err=True)
         raise click.exceptions.Exit(1)
-    from benchmarks.console import board_for, say
+    if part.folder != out:
+        write_pictures(part.folder)
+    return result
 
-    image, page = _pictures(out)
+
+def _tell(presenter: Presenter, result: SearchResult, parts: Collection[Part]) -> None:
+    """Say what the search of the folder itself found, and where everything lies."""
+    from benchmarks.console import say
+
+    assert result.folder is not None
+    written = write_pictures(result.folder)
     console = say()
-    console.print(board_for(console, result.best_layout))
-    summary = result.workspace.summary(result.best_genome)
+    console.print(presenter.text(console, result.best_layout))
+    summary, unit = result.workspace.summary(result.best_genome), presenter.words["distance_unit"]
     console.print(
         f"{result.config['objective']['name']} {number(result.best_objective, 4)} "
-        f"(legibility {number(summary['score'])}, distance {number(summary['distance'], 1)}) "
+        f"(legibility {number(summary['score'])}, distance {number(summary['distance'], 1)} {unit}) "
         f"after {result.evaluations:,} evaluations in {result.seconds:.1f} s"
     )
-    console.print(f"picture {image}\nreport  {page}")
+    for name, path in written.items():
+        console.print(f"{name:<8}{path}", soft_wrap=True)
+    if len(parts) > 1:
+        console.print(f"each of the {len(parts)} searches has a folder of its own there", style="dim")
 
 
-def _pictures(out: Path) -> tuple[Path, Path]:
+def write_pictures(folder: Path) -> dict[str, Path]:
+    """Write pictures and report of a run; what was written, by what it is."""
     from benchmarks.report import write_best_image, write_report
+    from benchmarks.runs import read_run
 
-    return write_best_image(out), write_report(out)
+    written, run = {"picture": write_best_image(folder)}, read_run(folder)
+    if (boards := presenter_of(str(run.config["workspace"]["workspace"])).write_boards(run)) is not None:
+        written["boards"] = boards
+    return {**written, "report": write_report(folder)}
 
 
 def emitter_rows() -> list[dict[str, Any]]:

@@ -4,7 +4,7 @@
 ``config.json`` the manifest: versions, settings, seed, git revision, and the result once there is one
 ``metrics.csv`` one row per logged iteration (:data:`COLUMNS`)
 ``archive.npz`` the elites as plain arrays (:data:`optimizers.archives.FIELDS`)
-``best.txt``    the best layout, drawn in characters
+``best.txt``    the best layout, drawn in characters; ``best.json`` instead where layouts have a ``to_json()``
 ``checkpoint/`` what :mod:`optimizers.checkpoint` needs to continue
 =============== ======================================================================================================
 
@@ -58,6 +58,7 @@ class RunFolder:
         self._config = path / "config.json"
         self._metrics = path / "metrics.csv"
         self._best = path / "best.txt"
+        self._best_json = path / "best.json"
 
     @property
     def holds_a_run(self) -> bool:
@@ -76,7 +77,8 @@ class RunFolder:
                     f"{self.path} already holds a run: continue it with resume=True, choose another folder, or pass "
                     "overwrite=True to replace it"
                 )
-            for file in (self._config, self._metrics, self.archive, self._best, *self.checkpoints.glob("*.checkpoint")):
+            best = (self._best, self._best_json)
+            for file in (self._config, self._metrics, self.archive, *best, *self.checkpoints.glob("*.checkpoint")):
                 file.unlink(missing_ok=True)
         self.path.mkdir(parents=True, exist_ok=True)
         remove_leftovers(self.path)
@@ -103,9 +105,11 @@ class RunFolder:
         write_atomically(self._config, lambda stream: stream.write(text.encode()))
 
     def write_best(self, layout: object) -> None:
-        """Write the drawing of the best layout."""
-        text = str(layout).rstrip("\n") + "\n"
-        write_atomically(self._best, lambda stream: stream.write(text.encode()))
+        """Write the best layout: as JSON where it can say itself so, else as its drawing."""
+        as_json = getattr(layout, "to_json", None)
+        text = (str(layout) if as_json is None else as_json()).rstrip("\n") + "\n"
+        path = self._best if as_json is None else self._best_json
+        write_atomically(path, lambda stream: stream.write(text.encode()))
 
     def rewrite_metrics(self, rows: Iterable[Mapping[str, Any]]) -> None:
         """Write ``metrics.csv`` with exactly these rows."""

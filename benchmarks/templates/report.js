@@ -4,7 +4,6 @@
   const $ = (id) => document.getElementById(id);
   const SVG = $("icons").namespaceURI;
   const [rowAxis, columnAxis] = data.axes;
-  const STATIONS = { T: "tomato", O: "onion", C: "cabbage", F: "fish", D: "dish", P: "pot", S: "serving" };
 
   // -- small helpers ---------------------------------------------------------------------------------------------------
 
@@ -36,37 +35,7 @@
   // Lightness rises evenly, so equal steps of the score look equal, and the order survives without colour vision.
   const ramp = (t) => `oklch(${(0.3 + 0.62 * t).toFixed(3)} ${(0.1 + 0.05 * Math.sin(Math.PI * t)).toFixed(3)} ${(285 - 185 * t).toFixed(1)})`;
 
-  // -- kitchens --------------------------------------------------------------------------------------------------------
-
-  function describe(layout, width) {
-    const places = [];
-    [...layout].forEach((symbol, i) => {
-      if (STATIONS[symbol]) places.push(`${STATIONS[symbol]} at row ${Math.floor(i / width)}, column ${i % width}`);
-    });
-    return `Kitchen: ${places.join("; ")}; ${plural([...layout].filter((s) => s === "V").length, "virtual obstacle")}.`;
-  }
-  function board(layout, [height, width]) {
-    const picture = svg("svg", { viewBox: `0 0 ${width * 48} ${height * 48}`, class: "board", role: "img", "aria-label": describe(layout, width) });
-    [...layout].forEach((symbol, i) => {
-      const row = Math.floor(i / width), column = i % width;
-      const place = { x: column * 48, y: row * 48, width: 48, height: 48 };
-      const floor = (row + column) % 2 ? "floor-alternate" : "floor";
-      if (symbol === " " || symbol === "V") picture.append(svg("use", { href: `#s-${floor}`, ...place }));
-      if (symbol !== " ") picture.append(svg("use", { href: `#s-${symbol}`, ...place }));
-      if (STATIONS[symbol]) {
-        const tag = svg("g", {}, svg("rect", { class: "tag", x: place.x + 30, y: place.y + 29, width: 17, height: 17, rx: 4.5 }));
-        const letter = svg("text", { class: "letter", x: place.x + 38.5, y: place.y + 42 });
-        letter.textContent = symbol;
-        tag.append(letter, svg("title"));
-        tag.lastChild.textContent = STATIONS[symbol];
-        picture.append(tag);
-      }
-    });
-    return picture;
-  }
-  function asText(layout, width) {
-    return layout.match(new RegExp(`.{${width}}`, "g")).join("\n");
-  }
+  const place = makePlace(data, { svg, number, plural });
 
   // -- the archive -----------------------------------------------------------------------------------------------------
 
@@ -79,14 +48,12 @@
   const shade = (value) => ramp(high > floorValue ? Math.max(0, Math.min(1, (value - floorValue) / (high - floorValue))) : 1);
   const cellWidth = Math.max(7, Math.min(26, 640 / columnAxis.count));
   const cellHeight = Math.max(6, Math.min(34, 560 / rowAxis.count));
-  const isOrder = (label) => [...String(label)].every((symbol) => STATIONS[symbol]);
-  const inWords = (label) => isOrder(label) ? [...label].map((symbol) => STATIONS[symbol]).join(" · ") : String(label);
   const longest = Math.max(...columnAxis.labels.map((label) => label.length));
   const margin = { left: 44, top: 4, bottom: 14 + longest * 6.6 + 22 };
   const size = { width: margin.left + columnAxis.count * cellWidth + 2, height: margin.top + rowAxis.count * cellHeight + margin.bottom };
   const cellX = (column) => margin.left + column * cellWidth;
   const cellY = (row) => margin.top + (rowAxis.count - 1 - row) * cellHeight;
-  const axisName = (name) => ({ obstacles: "virtual obstacles", order: "reading order of the ingredients" })[name] || name;
+  const axisName = (name) => data.words.axes[name] || name;
   const columnNames = [], rowNames = [];
   let picture, cursor, pinned = cells[0], shown = null;
 
@@ -108,7 +75,7 @@
       if (i % every === 0) text.textContent = label;
       columnNames.push(text);
       const title = svg("title");
-      title.textContent = (columnAxis.step > 1 ? "from " : "") + inWords(label);
+      title.textContent = (columnAxis.step > 1 ? "from " : "") + place.inWords(label);
       text.append(title);
       picture.append(text);
     });
@@ -158,10 +125,10 @@
     cursor.setAttribute("visibility", "visible");
     columnNames.forEach((text, i) => text.classList.toggle("on", i === cell.column));
     rowNames.forEach((text, i) => text.classList.toggle("on", i === cell.row));
-    $("board").replaceChildren(cell.layout ? board(cell.layout, data.shape) : el("div", { class: "missing" }, "The page carries the drawings of the best cells only; this layout lies in archive.npz."));
-    const obstacles = cell.layout ? [...cell.layout].filter((s) => s === "V").length : rowAxis.labels[cell.row];
-    const order = inWords(columnAxis.labels[cell.column]);
-    const facts = [["Legibility", number(cell.legibility)], ["Distance", number(cell.distance, 1)], ["Obstacles", String(obstacles)]];
+    $("board").replaceChildren(cell.layout ? place.board(cell.layout) : el("div", { class: "missing" }, "The page carries the drawings of the best cells only; this layout lies in archive.npz."));
+    const obstacles = cell.layout ? place.obstacles(cell.layout) : data.axes[0].name === "obstacles" ? rowAxis.labels[cell.row] : "–";
+    const order = place.inWords(columnAxis.labels[cell.column]);
+    const facts = [["Legibility", number(cell.legibility)], ["Distance", number(cell.distance, data.words.distance_digits)], ["Obstacles", String(obstacles)]];
     if (!["legibility", "efficiency"].includes(data.objective.name)) facts.unshift([data.objective.name, number(cell.objective)]);
     $("readout").replaceChildren(el("p", { class: "order" }, (columnAxis.step > 1 ? "near " : "") + order), pairs(facts), el("div", { class: "rank" }, `rank ${number(cell.rank + 1, 0)} of ${number(cells.length, 0)}`));
     $("show-previous").disabled = cell.rank === 0;
@@ -211,7 +178,7 @@
     $("show-best").addEventListener("click", () => pin(cells[0]));
     $("show-previous").addEventListener("click", () => pin(cells[pinned.rank - 1]));
     $("show-next").addEventListener("click", () => pin(cells[pinned.rank + 1]));
-    $("copy").addEventListener("click", () => copy(asText(shown.layout, data.shape[1])));
+    $("copy").addEventListener("click", () => copy(place.asText(shown.layout)));
     $("download").addEventListener("click", download);
   }
   async function copy(text) {
@@ -248,9 +215,9 @@
     const range = (key) => [Math.min(0, ...data.conditions.map((c) => c[key])), Math.max(0, ...data.conditions.map((c) => c[key]))];
     const [scores, distances] = [range("score"), range("distance")];
     for (const condition of data.conditions) {
-      $("conditions").append(el("figure", {}, board(condition.layout, condition.shape),
+      $("conditions").append(el("figure", {}, place.board(condition.layout, condition.ways),
         el("figcaption", {}, el("div", { class: "name" }, condition.name[0].toUpperCase() + condition.name.slice(1)), el("p", { class: "note" }, condition.note),
-          bar("legibility", condition.score, scores, 2), bar("distance", condition.distance, distances, 1))));
+          bar("legibility", condition.score, scores, 2), bar("distance", condition.distance, distances, data.words.distance_digits), condition.detour === null ? null : bar("detour", condition.detour, [1, Math.max(...data.conditions.map((c) => c.detour), 1.2)], 2))));
     }
   }
   function drawBest() {
@@ -258,9 +225,9 @@
     for (const cell of cells) {
       if (!cell.layout || seen.has(cell.column) || seen.size === 12) continue;
       seen.add(cell.column);
-      const card = el("button", { type: "button", class: "card", "aria-label": `Show the layout of rank ${cell.rank + 1} on the map` }, board(cell.layout, data.shape));
+      const card = el("button", { type: "button", class: "card", "aria-label": `Show the layout of rank ${cell.rank + 1} on the map` }, place.board(cell.layout));
       card.addEventListener("click", () => { pin(cell); $("map").focus({ preventScroll: true }); $("h-archive").scrollIntoView({ behavior: matchMedia("(prefers-reduced-motion: reduce)").matches ? "auto" : "smooth" }); });
-      $("best").append(el("figure", {}, card, el("figcaption", {}, el("div", { class: "name" }, number(cell.objective)), el("p", { class: "note" }, `${columnAxis.labels[cell.column]} · ${plural([...cell.layout].filter((s) => s === "V").length, "obstacle")} · distance ${number(cell.distance, 1)}`))));
+      $("best").append(el("figure", {}, card, el("figcaption", {}, el("div", { class: "name" }, number(cell.objective)), el("p", { class: "note" }, `${columnAxis.labels[cell.column]} · ${plural(place.obstacles(cell.layout), "obstacle")} · distance ${number(cell.distance, data.words.distance_digits)}`))));
     }
   }
 

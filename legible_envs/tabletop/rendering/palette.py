@@ -37,12 +37,12 @@ TABLE: Final[dict[str, str]] = {
 """Colours as ``#rrggbb`` by what they paint."""
 
 NAMED: Final[dict[str, str]] = {
-    "red": "#c2352c",
-    "green": "#4fae62",
+    "red": "#b92d27",
+    "green": "#4fb888",
     "blue": "#2b62c0",
     "yellow": "#f5c72f",
-    "orange": "#ee8a2b",
-    "purple": "#7c4aa8",
+    "orange": "#e2761b",
+    "purple": "#a173cc",
     "pink": "#e68ab0",
     "brown": "#7d5233",
     "grey": "#8d9196",
