@@ -18,7 +18,7 @@ from legible_envs.tabletop.layout import TabletopLayout
 from legible_envs.tabletop.observations import Observer
 from legible_envs.tabletop.settings import TableSettings, read_start
 from legible_envs.tabletop.task import TabletopTask
-from legible_envs.tabletop.team import Team, make_partner
+from legible_envs.tabletop.team import Team, make_partner, read_predictor
 from legible_envs.tabletop.view import TableView
 from legible_envs.tabletop.watching import ReachWatcher
 
@@ -130,7 +130,7 @@ class TabletopEnv(JsonSpec, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
     | `layout_id`     | twelve hexadecimal digits that identify the layout |
     | `belief`        | with a predictor or partner: `{goal: probability}` of the present reach, None where there is none |
     | `robot_state`, `robot_target` | with a partner: what it does, and with which object |
-    | `completion_time`, `human_idle`, `robot_idle`, `concurrent_activity`, `functional_delay`, `conflicts`, `decision_time`, `decision_fraction`, `decided`, `decided_rightly` | with a partner: measures of the team so far, see `legible_envs.tabletop.fluency`; None where not known yet |
+    | `completion_time`, `human_idle`, `robot_idle`, `concurrent_activity`, `functional_delay`, `conflicts`, `goals_lost`, `decision_time`, `decision_fraction`, `decided`, `decided_rightly` | with a partner: measures of the team so far, see `legible_envs.tabletop.fluency`; None where not known yet |
 
     ## Arguments
 
@@ -209,7 +209,9 @@ class TabletopEnv(JsonSpec, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
             threshold=threshold,
         )
         self.render_mode = render_mode
+        start, layout = self.settings.task.graph.start, self.settings.layout
         self._game = TableGame(self.settings.task, self.settings.rules)
+        self._game.begin(layout, layout.place(start), start)
         self._team = self._make_team(partner, predictor)
         self._observer = Observer(self.settings.task, max_obstacles, partner is not None)
         self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
@@ -218,14 +220,13 @@ class TabletopEnv(JsonSpec, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
         self._window: Any = None
 
     def _make_team(self, partner: Any, predictor: Any) -> Team:
-        reader = None if isinstance(predictor, str) and predictor == "eq1" else predictor
         if partner is None:
-            return Team(watcher=None if predictor is None else ReachWatcher(reader))
+            return Team(watcher=None if predictor is None else ReachWatcher(read_predictor(predictor)))
         if not self.settings.task.configuration:
             raise ValueError(
                 f"a robot puts objects in their places in the configuration; task {self.settings.task.name!r} has none"
             )
-        return Team(make_partner(partner, reader, self.settings.threshold))
+        return Team(make_partner(partner, predictor, self.settings.threshold))
 
     # -- the Gymnasium interface --------------------------------------------------------------------------------------
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
@@ -39,10 +40,16 @@ def read_task(value: Any) -> TabletopTask:
     if isinstance(value, Path) or (isinstance(value, str) and value.endswith((".yaml", ".yml"))):
         return TabletopTask.from_yaml(value)
     if isinstance(value, str):
-        return TabletopTask.named(value)
+        return _named(value)
     raise TaskError(
         f"`task` must be a TabletopTask, a name, a path or a mapping, got {type(value).__name__}: {value!r}"
     )
+
+
+@cache
+def _named(name: str) -> TabletopTask:
+    # A task is immutable, and counting its states takes long where there are many.
+    return TabletopTask.named(name)
 
 
 def read_layout(value: Any, task: TabletopTask, max_obstacles: int) -> TabletopLayout:

@@ -16,7 +16,7 @@ from legible_envs.tabletop.game import DT, RATE, TableGame
 from legible_envs.tabletop.robot import Command, RobotPartner, Senses
 from legible_envs.tabletop.watching import ReachWatcher
 
-__all__ = ["GRIPPER_SPEED", "MEASURES", "Team", "make_partner"]
+__all__ = ["GRIPPER_SPEED", "MEASURES", "Team", "make_partner", "read_predictor"]
 
 GRIPPER_SPEED: Final = 1.0
 """No gripper is faster, m/s."""
@@ -31,6 +31,7 @@ MEASURES: Final = (
     "concurrent_activity",
     "functional_delay",
     "conflicts",
+    "goals_lost",
     "decision_time",
     "decision_fraction",
     "decided",
@@ -38,6 +39,11 @@ MEASURES: Final = (
 )
 
 _IDLE_SPEED: Final = 0.01
+
+
+def read_predictor(spec: Any) -> Any:
+    """What :class:`~legible_envs.tabletop.watching.ReachWatcher` takes for what a user names; ``"eq1"`` is built in."""
+    return None if isinstance(spec, str) and spec == "eq1" else spec
 
 
 def make_partner(spec: Any, predictor: Any, threshold: float) -> Any:
@@ -57,7 +63,7 @@ def make_partner(spec: Any, predictor: Any, threshold: float) -> Any:
         spec = {}
     if isinstance(spec, Mapping):
         try:
-            return RobotPartner(predictor, **{"threshold": threshold, "rate": float(RATE), **spec})
+            return RobotPartner(read_predictor(predictor), **{"threshold": threshold, "rate": float(RATE), **spec})
         except TypeError as error:
             raise ValueError(f"`partner` has arguments that RobotPartner does not take: {error}") from error
     if predictor is not None:
@@ -99,6 +105,7 @@ class Team:
         self.belief: dict[str, float] | None = None
         self._metrics = TeamMetrics()
         self._senses: Senses | None = None
+        self._lost = False
 
     @property
     def is_there(self) -> bool:
@@ -122,12 +129,14 @@ class Team:
         if command is None or self.gripper is None:
             return 0
         done = 0
+        wanted, held = game.goal, game.robot_holding
         if command.release:
             done = game.robot_put(self.gripper, GRIPPER_REACH)
         if command.grasp is not None and command.grasp in game.index:
             there = game.positions[game.index[command.grasp]]
             if math.dist(self.gripper, there) <= GRIPPER_REACH:
                 game.robot_take(command.grasp)
+        self._lost = wanted is not None and game.robot_holding == game.index[wanted] != held
         self._move(command, game)
         return done
 
@@ -140,7 +149,7 @@ class Team:
         """
         if self._senses is not None and self.command is not None:
             active = has_acted or game.speed > _IDLE_SPEED
-            self._metrics.add(tick_of(self._senses, self.command, active))
+            self._metrics.add(tick_of(self._senses, self.command, active, self._lost))
             if game.progress.is_over:
                 self._metrics.complete(game.time)
 
