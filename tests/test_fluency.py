@@ -145,8 +145,8 @@ def test_waiting_is_no_reach_and_without_a_choice_there_is_nothing_to_read():
 
 def test_before_anything_happened_shares_are_not_numbers():
     found = TeamMetrics().summary()
-    assert found["time"] == found["conflicts"] == found["reaches"] == 0
-    assert all(math.isnan(found[key]) for key in found if key not in ("time", "conflicts", "reaches"))
+    assert found["time"] == found["conflicts"] == found["goals_lost"] == found["reaches"] == 0
+    assert all(math.isnan(found[key]) for key in found if key not in ("time", "conflicts", "goals_lost", "reaches"))
     found = measured([Tick(3.0, "a", "b")]).summary()
     assert math.isnan(found["human_idle"])
     assert math.isnan(found["completion_time"])
@@ -180,3 +180,10 @@ def test_a_line_from_what_the_robot_sensed_and_did():
     command = Command(origin, target="milk", predicted="cup", decided=True, conflict=True)
     assert tick_of(senses, command, True) == Tick(2.0, 3, "milk", 3, "cup", "cup", 0, True)
     assert tick_of(senses, command, False).human is None
+    assert tick_of(senses, command, False, lost=True).lost
+
+
+def test_conflicts_are_lost_by_the_robot_or_by_the_person():
+    log = [Tick(0.0, conflict=True), Tick(1.0), Tick(2.0, lost=True), Tick(3.0, conflict=True)]
+    found = measured(log, 4.0).summary()
+    assert (found["conflicts"], found["goals_lost"]) == (3, 1)

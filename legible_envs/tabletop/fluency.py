@@ -35,6 +35,7 @@ class Tick:
         choices: How many objects the person may validly reach for; 0 while they must wait. Does not count while they
             hold something. A real choice unless told otherwise.
         conflict: Whether the robot gave up its target in this line because the person took it.
+        lost: Whether the robot took in this line what the person was going for, where that is known.
     """
 
     time: float
@@ -45,15 +46,17 @@ class Tick:
     predicted: str | None = None
     choices: int = 2
     conflict: bool = False
+    lost: bool = False
 
 
-def tick_of(senses: Senses, command: Command, human_active: bool) -> Tick:
+def tick_of(senses: Senses, command: Command, human_active: bool, lost: bool = False) -> Tick:
     """The line of a log for one step of a robot.
 
     Args:
         senses: What the robot sensed.
         command: What it did.
         human_active: Whether the person is doing something: moving their hand, taking or placing an object.
+        lost: Whether the robot took what the person was going for.
     """
     return Tick(
         time=senses.time,
@@ -64,6 +67,7 @@ def tick_of(senses: Senses, command: Command, human_active: bool) -> Tick:
         predicted=command.predicted,
         choices=len(senses.goals),
         conflict=command.conflict,
+        lost=lost,
     )
 
 
@@ -112,12 +116,15 @@ class TeamMetrics:
 
     Attributes:
         readings: Every reach that ended in taking an object.
-        conflicts: How often the robot gave up its target because the person took it.
+        conflicts: How often both wanted the same object: the person took the robot's target, or the robot took what
+            the person was known to go for.
+        goals_lost: How often it was the latter, the price of acting on a wrong guess.
     """
 
     def __init__(self) -> None:
         self.readings: list[Reading] = []
         self.conflicts = 0
+        self.goals_lost = 0
         self._first: Tick | None = None
         self._last: Tick | None = None
         self._human_idle = self._robot_idle = self._concurrent = 0.0
@@ -144,7 +151,8 @@ class TeamMetrics:
         self._count_time(last, tick.time)
         self._follow_actions(tick)
         self._follow_reach(tick)
-        self.conflicts += tick.conflict
+        self.conflicts += tick.conflict + tick.lost
+        self.goals_lost += tick.lost
         self._last = tick
 
     def complete(self, time: float) -> None:
@@ -153,7 +161,7 @@ class TeamMetrics:
         Raises:
             ValueError: Before the last line.
         """
-        self.add(replace(self._last or Tick(time), time=time, conflict=False))
+        self.add(replace(self._last or Tick(time), time=time, conflict=False, lost=False))
         self._completed = time
 
     def summary(self) -> dict[str, float]:
@@ -162,9 +170,9 @@ class TeamMetrics:
         Returns:
             ``time`` since the first line and ``completion_time``, the same once the task is done (NaN before), in
             seconds; as shares of ``time`` (NaN where it is 0) ``human_idle``, ``robot_idle``, ``concurrent_activity``
-            and ``functional_delay``; ``conflicts`` and ``reaches``, counted; over the reaches with more than one choice
-            (NaN without any) the means ``decision_time`` in seconds and ``decision_fraction``, in which a reach that
-            the robot was never sure of counts whole, and the shares ``decided`` and ``decided_rightly``.
+            and ``functional_delay``; ``conflicts``, ``goals_lost`` and ``reaches``, counted; over the reaches with more
+            than one choice (NaN without any) the means ``decision_time`` in seconds and ``decision_fraction``, in which
+            a reach that the robot was never sure of counts whole, and the shares ``decided`` and ``decided_rightly``.
 
             Functional delay adds up, for every action (in the order they began, the person's first of two at once)
             that follows one of the other agent, the time from that one's end to its own beginning: less than 0 where
@@ -188,6 +196,7 @@ class TeamMetrics:
             "concurrent_activity": share(self._concurrent),
             "functional_delay": share(self._functional_delay()),
             "conflicts": float(self.conflicts),
+            "goals_lost": float(self.goals_lost),
             "reaches": float(len(self.readings)),
             "decision_time": mean(r.decision_time for r in readings),
             "decision_fraction": mean(r.fraction for r in readings),
