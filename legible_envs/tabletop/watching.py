@@ -145,7 +145,8 @@ class _Reach:
 
     def show(self, senses: Senses) -> Any:
         """Show the predictor what it has not seen yet; the belief after it."""
-        states, times = senses.reach[self.seen :], senses.times[self.seen :].tolist()
+        # A copy, for a predictor may keep what it is shown.
+        states, times = senses.reach[self.seen :].copy(), senses.times[self.seen :].tolist()
         # A stream may have `add`, which takes a point without the cost of a belief nobody asks for.
         add = getattr(self.stream, "add", self.stream.update)
         for point, time in zip(states[:-1], times[:-1], strict=True):
