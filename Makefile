@@ -13,7 +13,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 LOCKED := requirements/constraints.txt
 EXAMPLE := docs/examples/legible-emitter-example
 
-.PHONY: help demo test test-benchmarks lint format bench lock clean
+.PHONY: help demo test test-benchmarks lint format docs bench lock clean
 .DEFAULT_GOAL := help
 
 help:
@@ -58,6 +58,11 @@ format: $(VENV)/.test-installed
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
+# make docs   build the site into docs/_build/html, warnings are errors
+docs: $(VENV)/.test-installed
+	rm -rf docs/_build docs/environments/Legible*
+	$(BIN)/python -m sphinx -q -W --keep-going -b html docs docs/_build/html
+
 # make bench   speed, as ratios within one run, with peers beside it
 bench: $(VENV)/.run-installed
 	$(BIN)/legible bench --peers --out docs/benchmarks.md
@@ -71,4 +76,4 @@ lock: | $(BIN)/python
 
 # make clean   remove environments, caches and runs
 clean:
-	rm -rf .venv .venv-* runs build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-* runs build dist docs/_build .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -11,6 +11,7 @@ from typing import Any
 import click
 
 from benchmarks.human_play.command import judge
+from benchmarks.reproducing import reproduce
 from benchmarks.sweeping import sweep
 from legible_envs import __version__
 
@@ -60,6 +61,7 @@ def main(traceback: bool) -> None:
 
 
 main.add_command(sweep)
+main.add_command(reproduce)
 
 
 _out = click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Folder to write to.")

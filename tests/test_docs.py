@@ -1,0 +1,63 @@
+"""What the documentation shows is run: every block of Python, page by page, and every command and link it names."""
+
+from __future__ import annotations
+
+import importlib
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+PAGES = [
+    page
+    for page in [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+    if not {"_build", "examples"} & set(page.relative_to(ROOT).parts) and not page.name.startswith("Legible")
+]
+
+
+def blocks(page: Path, language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", page.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
+
+
+def name_of(page: Path) -> str:
+    return re.sub(r"\W", "_", str(page.relative_to(ROOT).with_suffix("")))
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, "python")], ids=name_of)
+def test_python_blocks_run_one_after_the_other(page, capsys, tmp_path, monkeypatch):
+    # A module of its own: what is defined on a page can be pickled and imported by name, as in a reader's file.
+    module = f"page_{name_of(page)}"
+    (tmp_path / f"{module}.py").write_text("\n".join(blocks(page, "python")), encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    importlib.import_module(module)
+    assert capsys.readouterr().out
+    assert {path.name for path in tmp_path.iterdir()} <= {f"{module}.py", "__pycache__"}, "a block wrote files"
+
+
+def test_there_are_pages_with_blocks():
+    assert sum(bool(blocks(page, "python")) for page in PAGES) >= 7
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_pictures_and_links_are_there(page):
+    for target in re.findall(r"\]\(([^)#\s]+)\)", page.read_text(encoding="utf-8")):
+        assert target.startswith("http") or (page.parent / target).exists(), target
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_command_lines_name_commands_that_exist(page):
+    from benchmarks.cli import main
+
+    text = "\n".join(blocks(page, "console"))
+    named = set(re.findall(r"^\$ legible (\w+)", text, re.MULTILINE))
+    assert named <= set(main.commands)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_sweep_files_are_toml(page):
+    import tomllib
+
+    for block in blocks(page, "toml"):
+        tomllib.loads(block)

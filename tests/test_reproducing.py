@@ -1,0 +1,89 @@
+"""The command that runs experiments, and the page it writes, on a small experiment of its own."""
+
+from __future__ import annotations
+
+import re
+import sys
+import types
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from click.testing import CliRunner
+
+from benchmarks import reproducing
+from benchmarks.cells import run_cells
+from benchmarks.cli import main
+from benchmarks.experiment_report import write_experiment_report
+from benchmarks.sections import Section, write_tables
+
+
+@pytest.fixture
+def small_experiment(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An experiment like the real ones: cells, a table from their results, sections from the table."""
+    module, analysis = types.ModuleType("small_experiment"), types.ModuleType("small_experiment.analysis")
+
+    def reproduce(folder, *, quick, seeds, workers, scheduler, progress):
+        cells = [{"seed": seed} for seed in range(seeds or (2 if quick else 4))]
+        rows = run_cells("cell_functions:draw", cells, folder, workers=1, scheduler=scheduler, progress=progress)
+        write_tables(folder / "tables", [("values", rows)])
+
+    def sections(folder):
+        return [
+            Section(
+                "What came out", "Words & more.\n\nA second one.", {"Values": pd.read_csv(folder / "tables/values.csv")}
+            )
+        ]
+
+    module.reproduce, analysis.sections = reproduce, sections
+    monkeypatch.setitem(sys.modules, "small_experiment", module)
+    monkeypatch.setitem(sys.modules, "small_experiment.analysis", analysis)
+    experiment = reproducing.Experiment("small_experiment", "Small?", "Few words.")
+    monkeypatch.setitem(reproducing.EXPERIMENTS, "overcooked", experiment)
+
+
+def test_the_command_runs_analyses_and_reports(small_experiment: None, tmp_path: Path) -> None:
+    arguments = ["reproduce", "overcooked", "--quick", "--out", str(tmp_path)]
+    done = CliRunner().invoke(main, arguments)
+    assert done.exit_code == 0, done.output
+    assert "values.csv" in done.output
+    page = (tmp_path / "report.html").read_text()
+    assert "What came out" in page
+    assert "Words &amp; more." in page
+    assert "quick version" in page
+    assert page.count("<tr>") == 1 + 4
+    stamps = [path.stat().st_mtime_ns for path in sorted((tmp_path / "cells").iterdir())]
+    assert CliRunner().invoke(main, arguments).exit_code == 0
+    assert stamps == [path.stat().st_mtime_ns for path in sorted((tmp_path / "cells").iterdir())]
+    assert (tmp_path / "report.html").read_text() == page
+
+
+def test_seeds_replace_the_experiments_own_number(small_experiment: None, tmp_path: Path) -> None:
+    CliRunner().invoke(main, ["reproduce", "overcooked", "--seeds", "3", "--out", str(tmp_path)])
+    assert len(list((tmp_path / "cells").iterdir())) == 3
+
+
+def test_every_experiment_has_its_module() -> None:
+    for experiment in reproducing.EXPERIMENTS.values():
+        module = __import__(f"{experiment.module}.analysis", fromlist=["sections"])
+        assert callable(module.sections)
+        assert callable(__import__(experiment.module, fromlist=["reproduce"]).reproduce)
+
+
+def test_the_page_holds_its_pictures_and_asks_for_nothing(tmp_path: Path) -> None:
+    picture = tmp_path / "a_curve.svg"
+    picture.write_text("<svg xmlns='http://www.w3.org/2000/svg'/>")
+    table = pd.DataFrame(
+        {"name": ["<b>", None], "value": [0.123456, float("nan")], "count": [1, 2], "good": [True, False]}
+    )
+    page = write_experiment_report(
+        tmp_path, [Section("A", "", {"Numbers": table}, [picture])], title="T", lede="L"
+    ).read_text()
+    assert "data:image/svg+xml;base64," in page
+    assert "&lt;b&gt;" in page
+    assert "0.1235" in page
+    assert re.findall(r"<td[^>]*>(yes|no)</td>", page) == ["yes", "no"]
+    assert not re.search(r"(?:src|href)=\"(?!data:|#)", page)
+    picture.rename(tmp_path / "a.gif")
+    with pytest.raises(ValueError, match=r"must be one of.*\.png"):
+        write_experiment_report(tmp_path, [Section("A", figures=[tmp_path / "a.gif"])], title="T", lede="L")
