@@ -41,6 +41,7 @@ class GoalPredictor(BaseEstimator, ABC):
     """
 
     classes_: npt.NDArray[np.str_]
+    _looked_up: tuple[npt.NDArray[np.str_], dict[tuple[str, ...], npt.NDArray[np.intp]]]
 
     def fit(self, X: Sequence[Trajectory], y: object = None) -> Self:
         """Learn from complete trajectories.
@@ -175,11 +176,22 @@ class GoalPredictor(BaseEstimator, ABC):
         """Columns of a trajectory's candidates, in their order."""
         if not hasattr(self, "classes_"):
             raise NotFittedError(f"this {type(self).__name__} is not fitted yet; call `fit` with trajectories first")
-        columns = np.searchsorted(self.classes_, walk.candidates)
-        known = self.classes_[np.minimum(columns, len(self.classes_) - 1)] == np.array(walk.candidates)
+        # People meet the same few sets of candidates again and again: look each one up once per fit.
+        looked_up = self.__dict__.get("_looked_up")
+        if looked_up is None or looked_up[0] is not self.classes_:
+            looked_up = self._looked_up = (self.classes_, {})
+        found: npt.NDArray[np.intp] | None = looked_up[1].get(walk.candidates)
+        if found is None:
+            found = looked_up[1][walk.candidates] = self._look_up(walk.candidates)
+        return found
+
+    def _look_up(self, candidates: tuple[str, ...]) -> npt.NDArray[np.intp]:
+        columns = np.searchsorted(self.classes_, candidates)
+        known = self.classes_[np.minimum(columns, len(self.classes_) - 1)] == np.array(candidates)
         if not known.all():
-            unknown = [name for name, is_known in zip(walk.candidates, known, strict=True) if not is_known]
+            unknown = [name for name, is_known in zip(candidates, known, strict=True) if not is_known]
             raise ValueError(f"unknown goals {unknown}; `fit` saw {self.classes_.tolist()}")
+        columns.flags.writeable = False
         return columns
 
 

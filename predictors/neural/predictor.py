@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import os
 import zipfile
@@ -33,28 +34,28 @@ _AT_ONCE: Final = 512
 class NeuralPredictor(GoalPredictor):
     """Base class of predictors that learn with an ensemble of causal networks.
 
-    Subclasses take the parameters below and their network's own, and define ``_network``.
+    Subclasses take the parameters below and their network's own, and define ``_network``. Theirs may come first and
+    the rest as ``**training``: the signature that users and scikit-learn see names them all.
+
+    Args:
+        members: Networks in the ensemble.
+        learning_rate: Of AdamW.
+        weight_decay: Of AdamW.
+        dropout: Share of each layer's outputs set to zero while training.
+        batch_size: Trajectories per step.
+        max_epochs: Most passes over the data.
+        patience: Passes without a better held-out loss after which a member is done.
+        validation_fraction: Share each member holds out; 0 holds out nothing (as where that would be less than two).
+        device: ``"auto"`` (a GPU if there is one), ``"cpu"``, ``"cuda"``, ….
+        random_state: Seed.
 
     Attributes:
-        members, learning_rate, weight_decay, dropout, batch_size, max_epochs, patience, validation_fraction, device,
-            random_state: Parameters, documented with each subclass.
         classes_: ``(K,)`` names of all goals and candidates seen in ``fit``, sorted.
         prior_: ``(K,)`` how often each goal was chosen when it was a candidate, one choice of each added.
         validation_loss_: ``(epochs, members)`` negative log-likelihood per prefix of what each member did not train on.
         weights_: The networks' weights by name, first axis the member.
         encoding_: How trajectories become inputs.
     """
-
-    members: int
-    learning_rate: float
-    weight_decay: float
-    dropout: float
-    batch_size: int
-    max_epochs: int
-    patience: int
-    validation_fraction: float
-    device: str
-    random_state: int
 
     _name: ClassVar[str]
     _sizes: ClassVar[tuple[str, ...]]
@@ -63,6 +64,41 @@ class NeuralPredictor(GoalPredictor):
     validation_loss_: npt.NDArray[np.float64]
     weights_: Weights
     encoding_: Encoding
+
+    def __init__(
+        self,
+        *,
+        members: int = 4,
+        learning_rate: float = 0.01,
+        weight_decay: float = 0.01,
+        dropout: float = 0.2,
+        batch_size: int = 64,
+        max_epochs: int = 100,
+        patience: int = 8,
+        validation_fraction: float = 0.2,
+        device: str = "auto",
+        random_state: int = 0,
+    ) -> None:
+        self.members = members
+        self.learning_rate = learning_rate
+        self.weight_decay = weight_decay
+        self.dropout = dropout
+        self.batch_size = batch_size
+        self.max_epochs = max_epochs
+        self.patience = patience
+        self.validation_fraction = validation_fraction
+        self.device = device
+        self.random_state = random_state
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Name the shared parameters in the subclass's signature, from which scikit-learn takes what to clone."""
+        super().__init_subclass__(**options)
+        own = inspect.signature(cls.__init__)
+        named = [each for each in own.parameters.values() if each.kind is not inspect.Parameter.VAR_KEYWORD]
+        if len(named) < len(own.parameters):
+            shared = inspect.signature(NeuralPredictor.__init__).parameters.values()
+            named += [each for each in shared if each.name not in own.parameters]
+            cls.__init__.__signature__ = own.replace(parameters=named)  # type: ignore[attr-defined]
 
     @abstractmethod
     def _network(self) -> Network:

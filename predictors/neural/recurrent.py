@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from predictors.neural.networks import Gru
 from predictors.neural.predictor import NeuralPredictor
 
@@ -21,16 +23,10 @@ class RecurrentPredictor(NeuralPredictor):
     Args:
         hidden_size: Units per layer.
         num_layers: Layers.
-        members: Networks in the ensemble.
         learning_rate: Of AdamW.
-        weight_decay: Of AdamW.
-        dropout: Share of each layer's outputs set to zero while training.
-        batch_size: Trajectories per step.
-        max_epochs: Most passes over the data.
-        patience: Passes without a better held-out loss after which a member is done.
-        validation_fraction: Share each member holds out; 0 holds out nothing (as where that would be less than two).
-        device: ``"auto"`` (a GPU if there is one), ``"cpu"``, ``"cuda"``, ….
-        random_state: Seed.
+        **training: The other parameters of :class:`~predictors.neural.predictor.NeuralPredictor`: ``members``,
+            ``weight_decay``, ``dropout``, ``batch_size``, ``max_epochs``, ``patience``, ``validation_fraction``,
+            ``device``, ``random_state``.
 
     Attributes:
         classes_: ``(K,)`` names of all goals and candidates seen in ``fit``, sorted.
@@ -46,29 +42,12 @@ class RecurrentPredictor(NeuralPredictor):
         hidden_size: int = 32,
         num_layers: int = 1,
         *,
-        members: int = 4,
         learning_rate: float = 0.02,
-        weight_decay: float = 0.01,
-        dropout: float = 0.2,
-        batch_size: int = 64,
-        max_epochs: int = 100,
-        patience: int = 8,
-        validation_fraction: float = 0.2,
-        device: str = "auto",
-        random_state: int = 0,
+        **training: Any,
     ) -> None:
+        super().__init__(learning_rate=learning_rate, **training)
         self.hidden_size = hidden_size
         self.num_layers = num_layers
-        self.members = members
-        self.learning_rate = learning_rate
-        self.weight_decay = weight_decay
-        self.dropout = dropout
-        self.batch_size = batch_size
-        self.max_epochs = max_epochs
-        self.patience = patience
-        self.validation_fraction = validation_fraction
-        self.device = device
-        self.random_state = random_state
 
     def _network(self) -> Gru:
         return Gru(self.hidden_size, self.num_layers)
