@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from benchmarks.human_play.sweep import LAYOUTS, REFERENCE
+from benchmarks.human_play.sweep import LAYOUTS, POINTING_REFERENCE, REFERENCE
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import pandas as pd
 
-__all__ = ["accuracy_table", "compare_with_reference", "summarise"]
+__all__ = ["accuracy_table", "compare_with_reference", "reference_rows", "summarise", "to_markdown"]
 
 
 def summarise(rows: pd.DataFrame) -> pd.DataFrame:
@@ -22,6 +24,7 @@ def summarise(rows: pd.DataFrame) -> pd.DataFrame:
             chance=("chance", "mean"),
             walks=("trajectory", "nunique"),
             participants=("participant", "nunique"),
+            repeats=("repeat", "nunique"),
         )
         .reset_index()
     )
@@ -54,7 +57,7 @@ def compare_with_reference(scores: pd.DataFrame) -> pd.DataFrame:
     """Mean accuracy beside that measured before with other implementations of the same ideas.
 
     Args:
-        scores: The rows of :func:`benchmarks.human_play.run.score_recorded_play`.
+        scores: The rows of :func:`benchmarks.human_play.run.score_recorded_play` or ``score_pointing``.
 
     Returns:
         Columns ``layout``, ``predictor``, ``accuracy``, ``reference`` and ``difference`` (NaN where none was measured).
@@ -65,8 +68,31 @@ def compare_with_reference(scores: pd.DataFrame) -> pd.DataFrame:
         for predictor, values in REFERENCE.items()
         for layout, value in zip(LAYOUTS, values, strict=True)
     }
+    known |= {("pointing", predictor): value for predictor, value in POINTING_REFERENCE.items()}
     pairs = zip(table["layout"], table["predictor"], strict=True)
     table["reference"] = [known.get(pair, float("nan")) for pair in pairs]
     table["difference"] = table["accuracy"] - table["reference"]
     table.attrs.update(scores.attrs)
     return table
+
+
+def reference_rows(scores: pd.DataFrame) -> list[dict[str, str]]:
+    """:func:`compare_with_reference` for reading: a row per predictor, per kitchen its accuracy and the difference."""
+    table = compare_with_reference(scores)
+    repeats = scores.groupby("predictor", sort=False)["repeats"].first()
+    rows = []
+    for predictor, part in table.groupby("predictor", sort=False):
+        row = {"predictor": str(predictor)}
+        for layout, accuracy, difference in zip(part["layout"], part["accuracy"], part["difference"], strict=True):
+            beside = "" if difference != difference else f" ({difference:+.3f})".replace("-", "\u2212")
+            row[str(layout)] = f"{accuracy:.3f}{beside}"
+        rows.append({**row, "repeats": str(repeats[predictor])})
+    return rows
+
+
+def to_markdown(rows: Sequence[dict[str, str]]) -> str:
+    """Rows as a Markdown table."""
+    columns = list(rows[0])
+    lines = ["| " + " | ".join(columns) + " |", "| --- |" + " ---: |" * (len(columns) - 1)]
+    lines += ["| " + " | ".join(row[name] for name in columns) + " |" for row in rows]
+    return "\n".join(lines) + "\n"
