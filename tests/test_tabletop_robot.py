@@ -583,6 +583,23 @@ def test_a_predictor_that_cannot_be_fitted_is_reported():
         robot.reset(COLUMNS.layout, COLUMNS)
 
 
+def test_a_predictor_that_could_be_fitted_elsewhere_is_fitted_there_again():
+    class Choosy(Uniform):
+        def fit(self, X):
+            if X[0].layout == WALLED:
+                raise ValueError("no walls")
+
+    def believes_at(layout):
+        robot.reset(layout, COLUMNS)
+        return robot.step(senses(AT_RED)).belief is not None
+
+    robot = RobotPartner(Choosy())
+    assert believes_at(COLUMNS.layout)
+    with pytest.warns(RuntimeWarning, match="no walls"):
+        assert not believes_at(WALLED)
+    assert believes_at(COLUMNS.layout)
+
+
 def test_importing_the_package_loads_nothing_heavy():
     import subprocess
     import sys
@@ -590,3 +607,41 @@ def test_importing_the_package_loads_nothing_heavy():
     code = "import sys, legible_envs.tabletop; print([m for m in ('numba', 'sklearn', 'pymunk') if m in sys.modules])"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "[]"
+
+
+# -- in the environment ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"partner": "robot"},
+        {"partner": {"max_speed": 1.0}, "threshold": 0.5, "layout": WALLED},
+        {"partner": "robot", "predictor": "predictors.reaching.bayesian:StraightLineBayesian", "layout": WALLED},
+        {"partner": "robot", "threshold": 0.0, "obstacles": "soft", "task": "tea", "contact": "always"},
+    ],
+)
+def test_teams_of_simulated_people_and_robots_finish_in_the_environment(arguments):
+    import gymnasium as gym
+
+    from legible_envs.tabletop.humans import sample_person
+    from legible_envs.tabletop.reaching_player import ReachingPlayer
+
+    env = gym.make("legible_envs:LegibleTabletop-v0", **arguments)
+    by_robot = 0
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        player = ReachingPlayer(sample_person(rng), rng)
+        env.reset(seed=seed)
+        over = False
+        while not over:
+            _, _, terminated, truncated, info = env.step(player(env))
+            view = env.unwrapped.view()
+            assert view.robot_holding is None or view.robot_holding != view.holding
+            over = terminated or truncated
+        assert terminated
+        assert info["completion_time"] == info["time"]
+        assert 0 <= info["concurrent_activity"] <= 1 - max(info["human_idle"], info["robot_idle"]) + 1e-9
+        by_robot += info["done"] - len(env.unwrapped.trajectories())
+    assert by_robot > 0
+    assert env.unwrapped._team.partner.failure is None

@@ -95,11 +95,11 @@ class ReachWatcher:
         if not hasattr(self._given, "fit") or hasattr(self._given, "classes_"):
             self._predictor = self._given
         elif self._fitted_on != (layout, task):
-            self._predictor = None
+            self._predictor, self._fitted_on = None, (layout, task)
             try:
                 fitted = copy.deepcopy(self._given)
                 fitted.fit(_people_at(layout, task))
-                self._predictor, self._fitted_on = fitted, (layout, task)
+                self._predictor = fitted
             except Exception as error:
                 self._report(error)
 
