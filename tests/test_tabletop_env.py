@@ -59,7 +59,7 @@ each = pytest.mark.parametrize("arguments", VARIANTS, ids=[f"table-{i}" for i in
 
 
 def make(**arguments):
-    return gym.make(NAME, **arguments)
+    return gym.make(NAME, **{"max_speed": 2.0, **arguments})
 
 
 # -- what Gymnasium asks -----------------------------------------------------------------------------------------

@@ -141,7 +141,7 @@ class TabletopEnv(JsonSpec, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
         obstacles: `"hard"` or `"soft"`.
         contact: When the hand pushes: `"slow"`, `"always"` or `"never"`.
         max_obstacles: Most obstacles a layout has.
-        max_speed: Of the hand, m/s.
+        max_speed: Of the hand, m/s. The default lets people's fastest reaches pass; 0.5 is easier to explore and learn.
         slow_speed: Up to which the hand takes, places and pushes, m/s.
         grasp_distance: Up to which it takes, metres from an object's outline.
         release_distance: Up to which it places, metres from the place.
@@ -177,7 +177,7 @@ class TabletopEnv(JsonSpec, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
         obstacles: str = "hard",
         contact: str = "slow",
         max_obstacles: int = 4,
-        max_speed: float = 2.0,
+        max_speed: float = 3.0,
         slow_speed: float = 0.2,
         grasp_distance: float = 0.03,
         release_distance: float = 0.05,

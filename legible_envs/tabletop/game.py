@@ -36,7 +36,7 @@ class GameRules:
 
     obstacles: Literal["hard", "soft"] = "hard"
     contact: Literal["slow", "always", "never"] = "slow"
-    max_speed: float = 2.0
+    max_speed: float = 3.0
     slow_speed: float = 0.2
     grasp_distance: float = 0.03
     release_distance: float = 0.05
