@@ -11,7 +11,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from legible_envs.compiled import kernel
 from legible_envs.tabletop.evidence import add_weighted, exponentials, settle_ties, sum_candidates
@@ -88,7 +87,11 @@ class Scratch(NamedTuple):
     observed: Floats
     excess: Floats
     evidence: Floats
-    blocked: npt.NDArray[np.bool_]
+    slack: Floats
+    most: Floats
+    away: Floats
+    seen: Ints
+    hints: Ints
     box_u: Floats
     box_v: Floats
     value: Floats
@@ -117,7 +120,11 @@ def make_scratch(num_obstacles: int, tables: ReachTables) -> Scratch:
         np.empty(most * k),
         np.empty((most, most * k)),
         np.empty((most, most * k)),
-        np.empty((most, most * k), dtype=np.bool_),
+        np.empty((most, most * k)),
+        np.empty(most * k),
+        np.empty(corners),
+        np.empty(corners, dtype=np.int64),
+        np.empty(most, dtype=np.int64),
         np.empty((num_obstacles, most * k)),
         np.empty((num_obstacles, most * k)),
         np.empty(tables.stage_weights.shape[1]),
@@ -155,18 +162,31 @@ def into_box(box: Floats, x: Floats, y: Floats, u: Floats, v: Floats) -> None:
 
 
 @kernel
-def mark_blocked(box: Floats, u: Floats, v: Floats, x: float, y: float, blocked: npt.NDArray[np.bool_]) -> None:
-    """Mark the points (in the frame of a box) whose straight way to ``(x, y)`` the box is in; see ``clear``."""
+def block(box: Floats, u: Floats, v: Floats, x: float, y: float, slack: Floats) -> None:
+    """Raise ``slack`` of points (in the frame of a box) to at least 0 if the box is in the straight way to ``(x, y)``.
+
+    The three separating axes of ``clear``; without branches, so that it is vectorised.
+    """
     cos, sin = box[2], box[3]
     a, b = box[4] - SHRINK, box[5] - SHRINK
     dx, dy = x - box[0], y - box[1]
     to_u, to_v = dx * cos + dy * sin, dy * cos - dx * sin
     for p in range(len(u)):
         mu, mv = 0.5 * (u[p] + to_u), 0.5 * (v[p] + to_v)
-        du, dv = 0.5 * (to_u - u[p]), 0.5 * (to_v - v[p])
-        blocked[p] |= (
-            (abs(mu) <= a + abs(du)) & (abs(mv) <= b + abs(dv)) & (abs(mu * dv - mv * du) <= a * abs(dv) + b * abs(du))
-        )
+        du, dv = abs(0.5 * (to_u - u[p])), abs(0.5 * (to_v - v[p]))
+        # |mu dv - mv du|, with the signs of the step
+        cross = abs(mu * (0.5 * (to_v - v[p])) - mv * (0.5 * (to_u - u[p])))
+        along, across, turned = a + du - abs(mu), b + dv - abs(mv), a * dv + b * du - cross
+        least = along if along < across else across
+        least = least if least < turned else turned
+        slack[p] = least if least > slack[p] else slack[p]
+
+
+@kernel
+def raise_to(values: Floats, most: Floats) -> None:
+    """``most = max(most, values)``."""
+    for p in range(len(values)):
+        most[p] = values[p] if values[p] > most[p] else most[p]
 
 
 @kernel
@@ -175,6 +195,29 @@ def straight_excess(x: Floats, y: Floats, seen: Floats, goal: Floats, optimal: f
     for p in range(len(x)):
         dx, dy = goal[0] - x[p], goal[1] - y[p]
         excess[p] = np.sqrt(dx * dx + dy * dy) + seen[p] - optimal
+
+
+@kernel
+def find_blocked(
+    boxes: Floats, tables: ReachTables, first: int, num_goals: int, num_points: int, scratch: Scratch
+) -> None:
+    """Write to ``scratch.slack [G, P]`` a number >= 0 where a box is in the straight way from point to goal.
+
+    A reach's own way is known and never counts. ``scratch.most [P]`` is the greatest number of each point.
+    """
+    per_goal = len(tables.fractions)
+    x, y, most = scratch.x[:num_points], scratch.y[:num_points], scratch.most[:num_points]
+    most[:] = -1.0
+    for i in range(len(boxes)):
+        into_box(boxes[i], x, y, scratch.box_u[i, :num_points], scratch.box_v[i, :num_points])
+    for g in range(num_goals):
+        slack = scratch.slack[g, :num_points]
+        slack[:] = -1.0
+        goal = scratch.target_points[tables.goal_target[first + g]]
+        for i in range(len(boxes)):
+            block(boxes[i], scratch.box_u[i, :num_points], scratch.box_v[i, :num_points], goal[0], goal[1], slack)
+        slack[g * per_goal : (g + 1) * per_goal] = -1.0
+        raise_to(slack, most)
 
 
 @kernel
@@ -189,46 +232,34 @@ def detour_excess(
     scratch: Scratch,
 ) -> None:
     """Replace the excess of blocked pairs of point and goal by that of the best way round a corner."""
-    corners, blocked = scratch.corners, scratch.blocked
-    per_goal = len(tables.fractions)
-    for i in range(len(boxes)):
-        into_box(
-            boxes[i],
-            scratch.x[:num_points],
-            scratch.y[:num_points],
-            scratch.box_u[i, :num_points],
-            scratch.box_v[i, :num_points],
-        )
-    for g in range(num_goals):
-        row = blocked[g, :num_points]
-        row[:] = False
-        goal = scratch.target_points[tables.goal_target[first + g]]
-        for i in range(len(boxes)):
-            u, v = scratch.box_u[i, :num_points], scratch.box_v[i, :num_points]
-            mark_blocked(boxes[i], u, v, goal[0], goal[1], row)
-        row[g * per_goal : (g + 1) * per_goal] = False  # a reach's own way is known
-        for p in range(num_points):
-            if row[p]:
-                scratch.excess[g, p] = np.inf
+    find_blocked(boxes, tables, first, num_goals, num_points, scratch)
+    corners, away, seen = scratch.corners, scratch.away, scratch.seen
+    hints = scratch.hints[:num_goals]
+    hints[:] = 0
     for p in range(num_points):
-        any_blocked = False
-        for g in range(num_goals):
-            any_blocked |= blocked[g, p]
-        if not any_blocked:
+        if scratch.most[p] < 0.0:
             continue
-        x, y, seen = scratch.x[p], scratch.y[p], scratch.observed[p]
+        x, y = scratch.x[p], scratch.y[p]
         for i in range(count):
-            to_corner = norm(corners[i, 0] - x, corners[i, 1] - y) + seen
-            is_tested = False
-            for g in range(num_goals):
-                if blocked[g, p]:
-                    excess = to_corner + scratch.lengths[tables.goal_target[first + g], i] - optimal[g]
-                    if excess < scratch.excess[g, p]:
-                        if not is_tested:
-                            if not clear(boxes, x, y, corners[i, 0], corners[i, 1]):
-                                break
-                            is_tested = True
-                        scratch.excess[g, p] = excess
+            away[i] = norm(corners[i, 0] - x, corners[i, 1] - y)
+            seen[i] = -1
+        for g in range(num_goals):
+            if scratch.slack[g, p] < 0.0:
+                continue
+            lengths = scratch.lengths[tables.goal_target[first + g]]
+            # The corner that was best from the point before is mostly best again; few others then need a look.
+            hint = hints[g]
+            best = np.inf
+            for k in range(-1, count):
+                i = hint if k < 0 else k
+                length = away[i] + lengths[i]
+                if length < best:
+                    if seen[i] < 0:
+                        seen[i] = 1 if clear(boxes, x, y, corners[i, 0], corners[i, 1]) else 0
+                    if seen[i] == 1:
+                        best = length
+                        hints[g] = i
+            scratch.excess[g, p] = best + (scratch.observed[p] - optimal[g])
 
 
 @kernel
