@@ -153,7 +153,7 @@ class TabletopEnv(JsonSpec, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
         predictor: What reads the person's reaches: `"eq1"`, the built-in Eq. 1; `"module:Class"`, the name of an
             installed predictor, or an object; None for nothing, or the built-in one with a partner. A predictor that
             fails is reported once by a warning; the robot waits and the episode goes on.
-        threshold: Probability from which the robot is sure.
+        threshold: Probability a goal must exceed for the robot to be sure; at 1 it never is.
         render_mode: None, `"human"` (a window) or `"rgb_array"`.
 
     Raises:
