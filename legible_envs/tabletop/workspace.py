@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from legible_envs.errors import LayoutError
 from legible_envs.legibility import Ties
+from legible_envs.rollouts import Trajectory
 from legible_envs.tabletop import genomes as kernels
 from legible_envs.tabletop import measures, validity
 from legible_envs.tabletop.design_rules import DesignRules
@@ -118,8 +119,8 @@ class TabletopWorkspace(Workspace):
         start_from: TabletopLayout | Mapping[str, Any] | None = None,
     ) -> None:
         self.task = _as_task(task)
-        is_shipped = task == self.task.name or (
-            self.task.name in task_names() and _as_task(self.task.name) == self.task
+        is_shipped = self.task.name in task_names() and (
+            task == self.task.name or _as_task(self.task.name) == self.task
         )
         self._task_config = self.task.name if is_shipped else self.task.to_dict()
         self.condition: Condition = check_choice("condition", condition, CONDITIONS)
@@ -411,6 +412,25 @@ class TabletopWorkspace(Workspace):
             ties=self.ties,
             tie_tolerance=self.tie_tolerance,
         )
+
+    def simulate(
+        self,
+        genome: npt.ArrayLike | TabletopLayout,
+        participants: int,
+        rng: np.random.Generator,
+        **settings: Any,
+    ) -> list[Trajectory]:
+        """Reaches of simulated people who each do the task at one table.
+
+        Args:
+            genome: ``(d,)``, or the table.
+            participants: Number of people.
+            rng: Source of all randomness.
+            **settings: See :func:`legible_envs.tabletop.humans.simulate_participants`.
+        """
+        from legible_envs.tabletop.humans import simulate_participants
+
+        return simulate_participants(self.task, self._one(genome), participants, rng, **settings)
 
     # -- configuration -------------------------------------------------------------------------------------------------
 
