@@ -84,7 +84,7 @@ def reference_rows(scores: pd.DataFrame) -> list[dict[str, str]]:
     for predictor, part in table.groupby("predictor", sort=False):
         row = {"predictor": str(predictor)}
         for layout, accuracy, difference in zip(part["layout"], part["accuracy"], part["difference"], strict=True):
-            beside = "" if difference != difference else f" ({difference:+.3f})".replace("-", "\u2212")
+            beside = "" if difference != difference else f" ({round(difference, 3) + 0.0:+.3f})".replace("-", "\u2212")
             row[str(layout)] = f"{accuracy:.3f}{beside}"
         rows.append({**row, "repeats": str(repeats[predictor])})
     return rows

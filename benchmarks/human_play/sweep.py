@@ -81,7 +81,8 @@ POINTING_PREDICTORS: Final = (
     Setting("Eq. 1, straight lines", "reach-bayesian"),
     Setting("Gaussian, open-end", "reach-gaussian"),
     Setting("Gaussian, index", "reach-gaussian", {"online": "index"}),
-    Setting("Gaussian with velocity", "reach-gaussian", {"velocity": True}),
+    Setting("Gaussian with velocity, open-end", "reach-gaussian", {"velocity": True}),
+    Setting("Gaussian with velocity, index", "reach-gaussian", {"velocity": True, "online": "index"}),
     Setting("Gaussian with velocity, newest sample", "reach-gaussian", {"velocity": True, "half_life": 0.0}),
     Setting("logistic", "reach-logistic"),
     Setting("logistic, degree 2", "reach-logistic", {"degree": 2}),
@@ -96,7 +97,7 @@ POINTING_REFERENCE: Final[Mapping[str, float]] = {
     "Eq. 1, straight lines": 0.759,
     "Gaussian, open-end": 0.711,
     "Gaussian, index": 0.723,
-    "Gaussian with velocity": 0.757,
+    "Gaussian with velocity, index": 0.757,
     "logistic": 0.776,
     "GRU": 0.798,
 }
