@@ -75,8 +75,8 @@ _COLUMN, _LINE = 0.02, 0.04  # metres of a character of a tabletop
 def table_text(console: Console, layout: TabletopLayout) -> Text:
     """A tabletop as a map of characters, 2 cm by 4 cm each, in the colours of its drawings.
 
-    Objects are two characters with their shape, or its initial where the console shows plain characters only; virtual
-    obstacles are ``##``, starts of the hand ``o``.
+    An object is its shape (or the initial of it, where the console shows plain characters only) and the initial of its
+    colour; virtual obstacles are lines, starts of the hand ``o``.
     """
     from rich.text import Text
 
@@ -101,7 +101,7 @@ def table_text(console: Console, layout: TabletopLayout) -> Text:
     for thing in layout.objects:
         colour, letter = hex_of(thing.colour), thing.shape[0].upper()
         symbol = _ON_TOP.get(thing.shape, letter) if fancy else letter
-        put(*thing.at, f"{symbol} " if fancy else f"{symbol}{thing.colour[0]}", f"bold {_ink(colour)} on {colour}")
+        put(*thing.at, f"{symbol}{thing.colour[0]}", f"bold {_ink(colour)} on {colour}")
     text = Text(no_wrap=True)
     for i, line in enumerate(cells):
         text.append("\n" if i else "")

@@ -75,12 +75,11 @@ def read_people(console: Console, design: Design, trajectories: Path) -> None:
         ValueError: The file holds no walks, or none made here.
     """
     from legible_envs.rollouts import CUTS
-    from predictors import BayesianGoalPredictor, ShortestDistance
 
     walks = walks_in(design, trajectories)
     fractions = (0.1, 0.3, 0.5, 0.7, 0.9)
     rows = []
-    for name, predictor in (("shortest distance", ShortestDistance()), ("Eq. 1", BayesianGoalPredictor())):
+    for name, predictor in design.readers():
         predictor.fit(walks)
         scores = [predictor.score(walks, fractions=(fraction,)) for fraction in fractions]
         rows.append({"predictor": name, **{f"{f:.0%}": s for f, s in zip(fractions, scores, strict=True)}})

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from legible_envs.drawing import Image
     from legible_envs.overcooked.recipes import Recipe
     from legible_envs.rollouts import Trajectory
+    from predictors import GoalPredictor
 
 __all__ = ["Kitchen", "KitchenPresenter", "kitchen_from", "load_kitchen"]
 
@@ -91,6 +92,12 @@ class Kitchen(Design):
         from legible_envs.overcooked.rendering import draw_ambiguity
 
         return draw_ambiguity(self.layout, self.ambiguity(), tile=72, title="Where goals are confused")
+
+    def readers(self) -> list[tuple[str, GoalPredictor]]:
+        """The heuristic, and Eq. 1 of the paper."""
+        from predictors import BayesianGoalPredictor, ShortestDistance
+
+        return [("shortest distance", ShortestDistance()), ("Eq. 1", BayesianGoalPredictor())]
 
     def was_walked(self, walk: Trajectory) -> bool:
         """Whether the walk has this kitchen's cells, wherever players started."""

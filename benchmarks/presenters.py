@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from legible_envs.drawing import Image
     from legible_envs.rollouts import Trajectory
     from legible_envs.workspace import Workspace
+    from predictors import GoalPredictor
 
 __all__ = ["DOMAINS", "Design", "Part", "Presenter", "load_design", "presenter_of", "read_source"]
 
@@ -91,6 +92,10 @@ class Design(ABC):
     def compared(self) -> list[dict[str, Any]]:
         """Rows about this layout and those that its run compares it with; none where there are none."""
         return []
+
+    @abstractmethod
+    def readers(self) -> list[tuple[str, GoalPredictor]]:
+        """Predictors without parameters to learn that walks made here are read with, by name."""
 
     @abstractmethod
     def was_walked(self, walk: Trajectory) -> bool:

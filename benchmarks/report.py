@@ -165,17 +165,19 @@ def _axes(run: Run, rows: int, columns: int) -> list[dict[str, Any]]:
     ):
         step = math.ceil(whole / most)
         low, high = archive["ranges"][i] if "ranges" in archive else (-0.5, whole - 0.5)
-        shown = [str(labels[n]) if labels else _cell_label(low, high, whole, n) for n in range(0, count, step)]
+        numbers = labels or _cell_labels(low, high, whole)
+        shown = [str(numbers[n]) for n in range(0, count, step)]
         axes.append({"name": str(name), "count": len(shown), "step": step, "labels": shown, "whole": whole})
     return axes
 
 
-def _cell_label(low: float, high: float, count: int, n: int) -> str:
-    """The number in the middle of a cell that holds one, else the cell's lower edge."""
+def _cell_labels(low: float, high: float, count: int) -> list[str]:
+    """For every cell the whole number in its middle, if each has one, else its lower edge."""
     width = (high - low) / count
     if math.isclose(width, 1.0) and math.isclose(low % 1.0, 0.5):
-        return str(round(low + 0.5) + n)
-    return f"{low + n * width:.{max(0, math.ceil(-math.log10(width) - 1e-9))}f}"
+        return [str(round(low + 0.5) + n) for n in range(count)]
+    digits = max(0, math.ceil(-math.log10(width)))
+    return [f"{low + n * width:.{digits}f}" for n in range(count)]
 
 
 def _cells(run: Run, presenter: Presenter, rows: int, columns: int) -> list[list[Any]]:

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final
 import numpy as np
 
 from benchmarks.console import number, table_text
-from benchmarks.presenters import Design, Part, Presenter, as_genome, load_design, refuse
-from benchmarks.runs import Run, RunError, read_run
+from benchmarks.presenters import Design, Part, Presenter, as_genome, load_design, read_source, refuse
+from benchmarks.runs import Run, RunError, is_run_folder, read_run
 from legible_envs.errors import LayoutError
 from legible_envs.files import write_atomically
 from legible_envs.tabletop import TabletopLayout, TabletopTask
@@ -25,8 +25,18 @@ if TYPE_CHECKING:
     from legible_envs.drawing import Image
     from legible_envs.rollouts import Trajectory
     from legible_envs.tabletop.scoring import TabletopScorer
+    from predictors import GoalPredictor
 
-__all__ = ["CONDITIONS", "TableDesign", "TablePresenter", "boards_of", "is_table", "table_from", "write_boards"]
+__all__ = [
+    "CONDITIONS",
+    "TableDesign",
+    "TablePresenter",
+    "boards_of",
+    "is_table",
+    "load_table",
+    "table_from",
+    "write_boards",
+]
 
 CONDITIONS: Final = {
     "placement": "Placement Optimized",
@@ -139,6 +149,14 @@ class TableDesign(Design):
             for c in boards_of(self.run)
         ]
 
+    def readers(self) -> list[tuple[str, GoalPredictor]]:
+        """The heuristic, and Eq. 1 of the paper."""
+        from predictors import StraightLineBayesian
+
+        beta = _beta(self.workspace)
+        straight = StraightLineBayesian(beta, obstacles=False)
+        return [("straight lines", straight), ("Eq. 1, shortest paths", StraightLineBayesian(beta))]
+
     def was_walked(self, walk: Trajectory) -> bool:
         """Whether the reach was made among these things."""
         return walk.layout == self.layout
@@ -182,6 +200,26 @@ def table_from(text: str, name: str, asked: Mapping[str, Any]) -> TableDesign:
     else:
         genome, broken_rule = as_genome(workspace, layout)
     return TableDesign(layout, None if genome is None else workspace, genome, broken_rule, settings, task)
+
+
+def load_table(source: str, task: str | None = None) -> TableDesign:
+    """Read a table; see :func:`benchmarks.presenters.load_design`.
+
+    Raises:
+        LayoutError: It is malformed, or a kitchen.
+        RunError: The run folder lacks something.
+        OSError: The file cannot be read.
+    """
+    if source != "-" and is_run_folder(source):
+        design = load_design(source)
+    else:
+        name, text = read_source(source)
+        if not is_table(text, source):
+            raise LayoutError(f"{source} is not the JSON of a table; expected a table", rule="type")
+        design = table_from(text, name, {} if task is None else {"task": task})
+    if not isinstance(design, TableDesign):
+        raise LayoutError(f"{source} is a {design.thing}; expected a table", rule="type")
+    return design
 
 
 def _task_of(layout: TabletopLayout, named: str | None) -> TabletopTask:
@@ -285,7 +323,7 @@ class TablePresenter(Presenter):
             "obstacles": "virtual obstacles",
             "mean detour": "mean detour",
         },
-        "archive": "with those measures",
+        "archive": "at that place of the two measures",
         "conditions": "The same objects and the same task. Lines are shortest reaches, darker where an observer cannot "
         "tell the goal yet. The price of a legible table is the length of the way.",
         "best": "The best layout of each column of the map, for the highest-scoring ones.",
@@ -301,10 +339,7 @@ class TablePresenter(Presenter):
         """Task, prefix, and the table to start from; the condition is chosen by :meth:`parts`."""
         found = {key: settings[key] for key in ("task", "prefix") if key in settings}
         if settings.get("start_from") is not None:
-            design = load_design(settings["start_from"], task=settings.get("task"))
-            if not isinstance(design, TableDesign):
-                raise LayoutError(f"{settings['start_from']} is a {design.thing}; expected a table", rule="type")
-            found["start_from"] = design.layout.to_dict()
+            found["start_from"] = load_table(settings["start_from"], settings.get("task")).layout.to_dict()
         return found
 
     def folder_name(self, settings: Mapping[str, Any]) -> str:
@@ -324,17 +359,19 @@ class TablePresenter(Presenter):
         listed = _listed(out) if settings["resume"] else {}
         if asked == "all" or (asked is None and listed):
             listed = listed or {"both": ".", "placement": "placement", "obstacles": "obstacles"}
-            text = json.dumps(listed, indent=1) + "\n"
-            out.mkdir(parents=True, exist_ok=True)
-            write_atomically(out / _LIST, lambda stream: stream.write(text.encode()))
-            return [
+            parts = [
                 Part(out / folder, make_workspace({**config, "condition": name}), CONDITIONS[name])
                 for name, folder in listed.items()
             ]
+            text = json.dumps(listed, indent=1) + "\n"
+            out.mkdir(parents=True, exist_ok=True)
+            write_atomically(out / _LIST, lambda stream: stream.write(text.encode()))
+            return parts
+        chosen = config if asked is None else {**config, "condition": asked}
+        part = Part(out, make_workspace(chosen))
         if not settings["resume"]:
             (out / _LIST).unlink(missing_ok=True)
-        chosen = config if asked is None else {**config, "condition": asked}
-        return [Part(out, make_workspace(chosen))]
+        return [part]
 
     def text(self, console: Console, layout: TabletopLayout) -> RenderableType:
         """The table as a map of characters."""

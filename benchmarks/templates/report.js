@@ -41,6 +41,7 @@
 
   const cells = data.cells.map(([row, column, objective, legibility, distance, layout], rank) => ({ row, column, objective, legibility, distance, layout, rank }));
   const at = new Map(cells.map((cell) => [cell.row * columnAxis.count + cell.column, cell]));
+  const hasCosts = cells.some((cell) => data.objective.name === "legibility" && Math.abs(cell.objective - cell.legibility) > 1e-3);
   const values = cells.map((cell) => cell.objective);
   const [low, high] = [Math.min(...values), Math.max(...values)];
   // The worst cells are much worse than the rest: the ramp starts at the tenth percentile.
@@ -49,7 +50,7 @@
   const cellWidth = Math.max(7, Math.min(26, 640 / columnAxis.count));
   const cellHeight = Math.max(6, Math.min(34, 560 / rowAxis.count));
   const longest = Math.max(...columnAxis.labels.map((label) => label.length));
-  const margin = { left: 44, top: 4, bottom: 14 + longest * 6.6 + 22 };
+  const margin = { left: Math.max(44, 26 + 6.4 * Math.max(...rowAxis.labels.map((label) => label.length))), top: 4, bottom: 14 + longest * 6.6 + 22 };
   const size = { width: margin.left + columnAxis.count * cellWidth + 2, height: margin.top + rowAxis.count * cellHeight + margin.bottom };
   const cellX = (column) => margin.left + column * cellWidth;
   const cellY = (row) => margin.top + (rowAxis.count - 1 - row) * cellHeight;
@@ -105,7 +106,7 @@
     const stops = Array.from({ length: 17 }, (_, i) => ramp(i / 16)).join(", ");
     const bar = el("span", { class: "ramp" });
     bar.style.background = `linear-gradient(90deg, ${stops})`;
-    const names = { "legibility": "legibility", "efficiency": "efficiency (distance, negated)" };
+    const names = { "legibility": hasCosts ? "legibility net of costs" : "legibility", "efficiency": "efficiency (distance, negated)" };
     const parts = [el("span", {}, names[data.objective.name] || data.objective.name), el("span", {}, (low < floorValue ? "≤ " : "") + number(floorValue)), bar, el("span", {}, number(high)), el("span", { class: "swatch ring" }), "best"];
     if (cells.length < rowAxis.count * columnAxis.count) parts.push(el("span", { class: "swatch" }), "none found");
     if (rowAxis.step * columnAxis.step > 1) parts.push(el("span", {}, `each square: the best of ${rowAxis.step * columnAxis.step} cells`));
@@ -130,6 +131,7 @@
     const order = place.inWords(columnAxis.labels[cell.column]);
     const facts = [["Legibility", number(cell.legibility)], ["Distance", number(cell.distance, data.words.distance_digits)], ["Obstacles", String(obstacles)]];
     if (!["legibility", "efficiency"].includes(data.objective.name)) facts.unshift([data.objective.name, number(cell.objective)]);
+    else if (hasCosts && data.objective.name === "legibility") facts.push(["Net of costs", number(cell.objective)]);
     $("readout").replaceChildren(el("p", { class: "order" }, (columnAxis.step > 1 ? "near " : "") + order), pairs(facts), el("div", { class: "rank" }, `rank ${number(cell.rank + 1, 0)} of ${number(cells.length, 0)}`));
     $("show-previous").disabled = cell.rank === 0;
     $("show-next").disabled = cell.rank === cells.length - 1;
@@ -261,7 +263,7 @@
   }
   function drawCurves() {
     const xs = data.history.evaluations;
-    const charts = [["best", "Best " + data.objective.name, number], ["qd_score", "QD score", (v) => number(v, 0)], ["coverage", "Coverage", (v) => number(v * 100, 1) + " %"]];
+    const charts = [["best", "Best " + data.objective.name + (hasCosts ? ", net of costs" : ""), number], ["qd_score", "QD score", (v) => number(v, 0)], ["coverage", "Coverage", (v) => number(v * 100, 1) + " %"]];
     const moves = [];
     for (const [key, title, format] of charts) {
       const points = data.history[key].map((v, i) => [xs[i], v]).filter(([, v]) => v !== null);

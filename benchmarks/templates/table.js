@@ -60,7 +60,8 @@ function makePlace(data, { svg, number, plural }) {
     }
     for (const [x, y, angle] of walls) {
       const [long, wide] = obstacle;
-      picture.append(svg("rect", { x: -long / 2, y: -wide / 2, width: long, height: wide, fill: colours.obstacle, stroke: colours.obstacle_edge, "stroke-width": 3.5, transform: `translate(${x / 10} ${up(y / 10)}) rotate(${-angle / 100})` }));
+      // Edges lie outside: on a small board they would leave nothing of the cyan.
+      picture.append(svg("rect", { x: -long / 2 - 1.2, y: -wide / 2 - 1.2, width: long + 2.4, height: wide + 2.4, fill: colours.obstacle, stroke: colours.obstacle_edge, "stroke-width": 2.4, transform: `translate(${x / 10} ${up(y / 10)}) rotate(${-angle / 100})` }));
     }
     // Doubt on top: the clearest reaches first.
     const total = (points) => points.reduce((sum, point) => sum + point[2], 0);
