@@ -27,7 +27,14 @@ from legible_envs.tabletop.humans import (
     simulate_reach,
     simulate_task,
 )
-from predictors import BayesianGoalPredictor, ShortestDistance, StraightLineBayesian, check_predictor
+from legible_envs.tabletop.workspace import TabletopWorkspace
+from predictors import (
+    BayesianGoalPredictor,
+    ShortestDistance,
+    StraightLineBayesian,
+    TimeSeriesGaussian,
+    check_predictor,
+)
 
 COLUMNS = TabletopTask.named("columns")
 HOME = COLUMNS.layout.table.starts["home"]
@@ -315,6 +322,17 @@ def test_orders_are_uniformly_random_and_seeds_repeat(tmp_path: object) -> None:
     assert simulate_participants(tea, tea.layout, 0, np.random.default_rng(0)) == []
 
 
+def test_a_workspace_has_people() -> None:
+    workspace = TabletopWorkspace("tea")
+    genome = workspace.sample(1, np.random.default_rng(0))[0]
+    model = ReachModel(Person(crossing_rate=0.5))
+    reaches = workspace.simulate(genome, 3, np.random.default_rng(1), model=model, condition="random")
+    layout = workspace.decode(genome)
+    again = simulate_participants(workspace.task, layout, 3, np.random.default_rng(1), model=model, condition="random")
+    assert reaches == again
+    assert reaches[0].layout == layout
+
+
 # -- what Eq. 1 makes of them ------------------------------------------------------------------------------------------
 
 
@@ -435,3 +453,40 @@ def test_plain_python_gives_the_same_reaches() -> None:
         outcomes.append([float(x) for x in done.stdout.split()])
     assert outcomes[0] == pytest.approx(outcomes[1], abs=1e-12)
     assert len(outcomes[0]) > 15
+
+
+def test_people_can_be_learned_and_plain_minimum_jerk_is_only_straight() -> None:
+    """As in recorded reaches, who learns from other people reads them better than straight lines do."""
+    workspace = TabletopWorkspace()
+    genome = workspace.sample(1, np.random.default_rng(1))[0]
+    plain = ReachModel(replace(Person(), skew=1.0, skew_trial=0.0, bow=0.0, bow_trial=0.0, aim=0.0), 0.0, 0.0, 0.0)
+    learned_gains = []
+    for model in (ReachModel(), plain):
+        reaches = workspace.simulate(genome, 40, np.random.default_rng(0), model=model)
+        reaches = [reach for reach in reaches if reach.start == "assembly" and len(reach.candidates) > 1]
+        train = [reach for reach in reaches if int(reach.participant.partition("/")[2]) < 25]
+        test = reaches[len(train) :]
+        lines, learned = (p.fit(train).score(test) for p in (StraightLineBayesian(), TimeSeriesGaussian()))
+        learned_gains.append(learned - lines)
+    assert learned_gains[0] > 0.03 > learned_gains[1]
+
+
+@pytest.mark.slow
+def test_people_are_read_better_on_optimised_tables_as_long_as_they_keep_off_obstacles() -> None:
+    """The order of the paper's conditions, judged with people whom the search does not know."""
+    from optimizers import search
+
+    layouts = {"baseline": TabletopWorkspace().baseline}
+    for condition in ("placement", "both"):
+        workspace = TabletopWorkspace(condition=condition)
+        layouts[condition] = search(workspace, objective="legibility", evaluations=20_000, seed=0).best_layout
+
+    def accuracy(condition: str, crossing_rate: float = 0.0) -> float:
+        model = ReachModel(Person(crossing_rate=crossing_rate))
+        people = simulate_participants(COLUMNS, layouts[condition], 30, np.random.default_rng(0), model=model)
+        return StraightLineBayesian().fit(people).score(people)
+
+    assert accuracy("baseline") + 0.05 < accuracy("placement") < accuracy("both") - 0.02
+    complying = [accuracy("both", rate) for rate in (0.0, 0.1, 0.5, 1.0)]
+    assert complying == sorted(complying, reverse=True)
+    assert complying[3] < accuracy("placement")  # people who ignore obstacles are misread
