@@ -37,9 +37,11 @@ from table_player import (
 
 import legible_envs  # noqa: F401
 from legible_envs.errors import LayoutError, TaskError
+from legible_envs.rollouts import load_trajectories, save_trajectories
 from legible_envs.tabletop import TableObject, TabletopLayout, TabletopTask, VirtualObstacle
 from legible_envs.tabletop.belief import EqOneBelief
 from legible_envs.tabletop.env import TabletopEnv
+from legible_envs.tabletop.recording import RecordReaches
 from legible_envs.tabletop.settings import read_layout
 from legible_envs.tasks import Subtask, TaskGraph
 
@@ -825,3 +827,32 @@ def test_reaches_become_trajectories():
     assert total < results[-1][4]["path_length"]
     env.reset()
     assert env.unwrapped.trajectories() == []
+
+
+def test_reaches_of_many_episodes_are_kept(tmp_path):
+    env = RecordReaches(make(partner="robot"), participant="p2", condition="robot")
+    counts = [len(env.trajectories())]
+    for seed in range(2):
+        info = play(env, seed)[-1][4]
+        counts.append(len(env.trajectories()))
+    assert counts[0] == 0 < counts[1] < counts[2] < 16  # the robot takes some
+    assert info["done"] == 8
+    with pytest.raises(LayoutError):
+        env.reset(options={"layout": 3})
+    assert len(env.trajectories()) == counts[2]
+    env.reset()
+    assert len(env.trajectories()) == counts[2]
+    assert {(r.participant, r.condition) for r in env.trajectories()} == {("p2", "robot")}
+    path = save_trajectories(tmp_path / "reaches.npz", env.trajectories())
+    assert load_trajectories(path) == env.trajectories()
+    with pytest.raises(LayoutError, match="LegibleTabletop"):
+        RecordReaches(gym.make("LegibleOvercooked-v0"))
+
+
+def test_playing_on_after_the_end_changes_nothing():
+    env = make(partner="robot")
+    last = play(env)[-1]
+    after = env.unwrapped.step(np.array([0.1, 0.0]))
+    assert after[2]
+    assert after[1] < 0
+    assert after[4]["completion_time"] == pytest.approx(last[4]["completion_time"], abs=0.05)
