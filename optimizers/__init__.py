@@ -11,8 +11,13 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from optimizers.archives import WorkspaceArchive, make_archive
+    from optimizers.emitters.annealing import AnnealingEmitter
     from optimizers.emitters.checks import check_emitter
+    from optimizers.emitters.covariance import CmaMaeEmitter, CmaMeEmitter
+    from optimizers.emitters.differential_evolution import DifferentialEvolutionEmitter
     from optimizers.emitters.improve import ImproveWorkspaceEmitter
+    from optimizers.emitters.mutation import MutationEmitter
+    from optimizers.emitters.novelty import NoveltyLocalCompetitionEmitter
     from optimizers.emitters.random import RandomWorkspaceEmitter
     from optimizers.emitters.registry import list_emitters, make_emitter, register_emitter
     from optimizers.errors import CheckpointError, EmitterError, SearchError, SearchInterrupted
@@ -21,10 +26,16 @@ if TYPE_CHECKING:
     from optimizers.searching import search
 
 _HOME = {
+    "AnnealingEmitter": "optimizers.emitters.annealing",
     "CheckpointError": "optimizers.errors",
+    "CmaMaeEmitter": "optimizers.emitters.covariance",
+    "CmaMeEmitter": "optimizers.emitters.covariance",
+    "DifferentialEvolutionEmitter": "optimizers.emitters.differential_evolution",
     "EmitterError": "optimizers.errors",
     "Evaluator": "optimizers.evaluate",
     "ImproveWorkspaceEmitter": "optimizers.emitters.improve",
+    "MutationEmitter": "optimizers.emitters.mutation",
+    "NoveltyLocalCompetitionEmitter": "optimizers.emitters.novelty",
     "RandomWorkspaceEmitter": "optimizers.emitters.random",
     "SearchError": "optimizers.errors",
     "SearchInterrupted": "optimizers.errors",
@@ -40,10 +51,16 @@ _HOME = {
 }
 
 __all__ = [
+    "AnnealingEmitter",
     "CheckpointError",
+    "CmaMaeEmitter",
+    "CmaMeEmitter",
+    "DifferentialEvolutionEmitter",
     "EmitterError",
     "Evaluator",
     "ImproveWorkspaceEmitter",
+    "MutationEmitter",
+    "NoveltyLocalCompetitionEmitter",
     "RandomWorkspaceEmitter",
     "SearchError",
     "SearchInterrupted",

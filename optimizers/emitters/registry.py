@@ -53,7 +53,13 @@ _registry = Registry(
     "emitter",
     ENTRY_POINT_GROUP,
     {
+        "annealing": "optimizers.emitters.annealing:AnnealingEmitter",
+        "cma-mae": "optimizers.emitters.covariance:CmaMaeEmitter",
+        "cma-me": "optimizers.emitters.covariance:CmaMeEmitter",
+        "differential-evolution": "optimizers.emitters.differential_evolution:DifferentialEvolutionEmitter",
         "improve": "optimizers.emitters.improve:ImproveWorkspaceEmitter",
+        "mutation": "optimizers.emitters.mutation:MutationEmitter",
+        "nslc": "optimizers.emitters.novelty:NoveltyLocalCompetitionEmitter",
         "random": "optimizers.emitters.random:RandomWorkspaceEmitter",
     },
     EmitterError,

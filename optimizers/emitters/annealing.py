@@ -1,0 +1,189 @@
+"""Population annealing in cycles: our own emitter, made to find better layouts than climbs do."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+from ribs.emitters import EmitterBase
+
+from optimizers.emitters.mutation import draw_elites, perturbed
+
+if TYPE_CHECKING:
+    from ribs.archives import ArchiveBase
+
+__all__ = ["AnnealingEmitter"]
+
+_CALIBRATION = 1000
+_CYCLE = 50_000
+_STEPS = 3000
+_CHAINS = 16
+Array = npt.NDArray[np.float64]
+
+
+class AnnealingEmitter(EmitterBase):
+    """Population annealing from random elites: walks that cool together and are replaced by better ones, in cycles.
+
+    A climb that only ever accepts better layouts ends where every single change is for the worse, and most changes to a
+    good kitchen are: a wall has to open before it can close elsewhere. An annealed walk (Kirkpatrick et al., 1983)
+    makes one random change at a time and accepts a loss ``d`` with probability ``exp(-d / temperature)``; as it cools
+    it settles in ever deeper valleys. One evaluation buys one step, where a climb pays for a whole fan of perturbations
+    to take one. All layouts met on the way are offered to the archive, so that hot walks explore it and cold ones
+    refine it. ``resamplings`` times a cycle, walks are drawn anew among themselves in proportion to how much the lower
+    temperature favours where they stand (Hukushima & Iba, 2003; here by systematic resampling): those in hopeless
+    valleys give their evaluations to those in promising ones.
+
+    ``chains`` walks start from random elites, every archive cell equally likely, and cool together over ``cycle``
+    evaluations; then others start. The temperature falls linearly from ``heat`` to ``heat * cold`` times the typical
+    change of score: the median absolute difference between a layout and its perturbation, taken over the first
+    thousand that differ. The emitter thus knows nothing of the unit of the objective.
+
+    Args:
+        archive: Archive of the search.
+        workspace: The design problem; must offer ``sample``, ``perturb`` and ``phases``. Where it has several phases,
+            each step is made in one drawn at random.
+        chains: Walks in lockstep. Default one for each 3,000 evaluations of a cycle, 4 to 16.
+        cycle: Evaluations from hot to cold. Default 50,000, or what makes whole cycles of at least that within
+            ``evaluations`` (a smaller budget is one cycle).
+        resamplings: How often in a cycle walks are drawn anew; 0 leaves plain simulated annealing.
+        heat: First temperature, in typical changes of score.
+        cold: Last temperature, as a share of the first.
+        evaluations: Planned number of evaluations, used only for the default of ``cycle``.
+        initial: Random layouts that come first: they are proposed while the archive is empty, and taken to be part of
+            ``evaluations``.
+        seed: Seed of this emitter's draws.
+
+    Attributes:
+        chains: Walks in lockstep.
+        cycle: Evaluations from hot to cold.
+        cycles: Cycles begun so far.
+    """
+
+    emits_valid = True
+
+    def __init__(
+        self,
+        archive: ArchiveBase,
+        workspace: Any,
+        *,
+        chains: int | None = None,
+        cycle: int | None = None,
+        resamplings: int = 30,
+        heat: float = 0.35,
+        cold: float = 0.03,
+        evaluations: int | None = None,
+        initial: int = 1000,
+        seed: int | np.random.SeedSequence | None = None,
+    ) -> None:
+        for name, value in (("chains", chains), ("cycle", cycle), ("initial", initial)):
+            if value is not None and value < 1:
+                raise ValueError(f"{name} must be at least 1, got {value}")
+        if resamplings < 0:
+            raise ValueError(f"resamplings must not be negative, got {resamplings}")
+        if not heat > 0:
+            raise ValueError(f"heat must be positive, got {heat}")
+        if not 0 < cold <= 1:
+            raise ValueError(f"cold must be above 0 and at most 1, got {cold}")
+        super().__init__(
+            archive,
+            solution_dim=archive.solution_dim,
+            bounds=None,
+            lower_bounds=workspace.lower_bounds,
+            upper_bounds=workspace.upper_bounds,
+        )
+        self.cycle = _default_cycle(evaluations, int(initial)) if cycle is None else int(cycle)
+        self.chains = max(4, min(_CHAINS, self.cycle // _STEPS)) if chains is None else int(chains)
+        self.cycles = 0
+        self._heat, self._cold, self._resamplings = float(heat), float(cold), int(resamplings)
+        self._workspace = workspace
+        self._initial = int(initial)
+        self._rng = np.random.default_rng(seed)
+        # One row per walk: where it stands and what that scores.
+        self._genomes = np.zeros((self.chains, int(archive.solution_dim)), dtype=archive.dtypes["solution"])
+        self._scores: Array = np.zeros(self.chains)
+        self._steps = max(1, self.cycle // self.chains)
+        self._step = 0
+        self._every = max(1, self._steps // resamplings) if resamplings else self._steps
+        self._changes: Array = np.zeros(0)
+        self._asked = False
+
+    @property
+    def settings(self) -> dict[str, float]:
+        """The settings in force, defaults resolved, for the manifest of a run."""
+        return {
+            "chains": self.chains,
+            "cycle": self.cycle,
+            "resamplings": self._resamplings,
+            "heat": self._heat,
+            "cold": self._cold,
+        }
+
+    @property
+    def temperature(self) -> float:
+        """The temperature now, in the unit of the objective; infinite before any change of score was seen."""
+        return self._temperature(self._step)
+
+    def _temperature(self, step: int) -> float:
+        if not self._changes.size:
+            return np.inf
+        share = step / self._steps
+        return self._heat * float(np.median(self._changes)) * (1.0 - share * (1.0 - self._cold))
+
+    def ask(self) -> npt.NDArray[Any]:
+        """Propose the next step of every walk: ``(chains, d)`` valid genomes."""
+        self._asked = not self.archive.empty
+        if not self._asked:
+            return self._workspace.sample(self._initial, self._rng)
+        if self._step == 0:
+            self._genomes, self._scores = draw_elites(self.archive, self.chains, self._rng)
+            self.cycles += 1
+        elif self._step % self._every == 0 and self.chains > 1:
+            self._resample()
+        return perturbed(self._workspace, self._genomes, self._rng)
+
+    def tell(
+        self,
+        solution: npt.ArrayLike,
+        objective: npt.ArrayLike,
+        measures: npt.ArrayLike,
+        add_info: dict[str, npt.NDArray[Any]],
+        **fields: npt.ArrayLike,
+    ) -> None:
+        """Let every walk accept its step or stay.
+
+        Args:
+            solution: ``(chains, d)`` what ``ask`` proposed.
+            objective: ``(chains,)`` scores, NaN where a layout is not allowed; no walk goes there.
+            measures: Not used.
+            add_info: Not used.
+            **fields: Not used.
+        """
+        if not self._asked:
+            return
+        scores = np.asarray(objective, dtype=np.float64)
+        change = np.where(np.isnan(scores), -np.inf, scores - self._scores)
+        if len(self._changes) < _CALIBRATION:
+            self._changes = np.concatenate([self._changes, np.abs(change[np.isfinite(change) & (change != 0)])])
+        odds = np.where(np.isinf(change), 0.0, np.exp(np.minimum(change, 0.0) / self.temperature))
+        accepted = self._rng.random(len(scores)) < odds
+        self._genomes[accepted] = np.asarray(solution)[accepted]
+        self._scores[accepted] = scores[accepted]
+        self._step = (self._step + 1) % self._steps
+
+    def _resample(self) -> None:
+        """Draw the walks anew, each in proportion to how its odds changed with the temperature."""
+        before, now = self._temperature(self._step - self._every), self.temperature
+        weights = np.exp((self._scores - self._scores.max()) * (1.0 / now - 1.0 / before))
+        ends = np.cumsum(weights) / weights.sum()
+        drawn = np.searchsorted(ends, (self._rng.random() + np.arange(self.chains)) / self.chains)
+        drawn = np.minimum(drawn, self.chains - 1)
+        self._genomes, self._scores = self._genomes[drawn], self._scores[drawn]
+
+
+def _default_cycle(evaluations: int | None, initial: int) -> int:
+    """Whole cycles of at least ``_CYCLE`` in what follows the initial layouts; a smaller budget is one cycle."""
+    if evaluations is None:
+        return _CYCLE
+    left = max(1, evaluations - min(initial, evaluations // 2))
+    return left // max(1, left // _CYCLE)
