@@ -3,7 +3,10 @@
 import itertools
 import json
 import math
+import os
 import pickle
+import subprocess
+import sys
 from collections import Counter
 
 import numpy as np
@@ -540,6 +543,32 @@ def test_the_greatest_spacing_is_that_of_a_triangular_lattice():
     at = [(0.1 + 0.1 * i + 0.05 * (j % 2), 0.2 + 0.1 * j * math.sqrt(3) / 2) for j in range(6) for i in range(7)]
     names = [TableObject(str(i), p) for i, p in enumerate(at)]
     assert 0.1 <= greatest_spacing(TabletopLayout(names), np.ones(len(at), bool)) < 0.115
+
+
+@pytest.mark.slow
+def test_genomes_vary_and_score_alike_as_plain_python():
+    code = (
+        "import numpy as np;"
+        "from legible_envs.tabletop import TabletopWorkspace;"
+        "ws = TabletopWorkspace('tea');"
+        "g = ws.sample(3, np.random.default_rng(0));"
+        "g = ws.perturb(ws.perturb(g, 1, np.random.default_rng(1)), 1, np.random.default_rng(2), phase=1);"
+        "print(*g.ravel(), *ws.legibility(g), *ws.measures(g).ravel(), ws.valid(g).all())"
+    )
+    environment = {k: v for k, v in os.environ.items() if k != "NUMBA_DISABLE_JIT"}
+    outcomes = []
+    for flag in ("0", "1"):
+        done = subprocess.run(
+            [sys.executable, "-c", code],
+            capture_output=True,
+            text=True,
+            check=True,
+            env={**environment, "NUMBA_DISABLE_JIT": flag},
+        )
+        *numbers, is_valid = done.stdout.split()
+        assert is_valid == "True"
+        outcomes.append([float(x) for x in numbers])
+    assert outcomes[0] == pytest.approx(outcomes[1], abs=1e-12)
 
 
 # -- starting from a table ---------------------------------------------------------------------------------------------
