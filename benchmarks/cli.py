@@ -323,8 +323,12 @@ def demo(out: Path, seed: int, offline: bool) -> None:
 
 @main.command()
 @click.option("--quick", is_flag=True, help="A tenth of the repeats: rough figures in a minute.")
-@click.option("--peers", is_flag=True, help="Measure Overcooked-AI beside it, in a virtual environment of its own.")
-@click.option("--peers-dir", type=click.Path(path_type=Path, file_okay=False), help="Where that environment lives.")
+@click.option(
+    "--peers",
+    is_flag=True,
+    help="Measure Overcooked-AI, imitation and irl-maxent beside it, each in an environment of its own (2 GB).",
+)
+@click.option("--peers-dir", type=click.Path(path_type=Path, file_okay=False), help="Where these environments live.")
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the table as Markdown.")
 def bench(quick: bool, peers: bool, peers_dir: Path | None, out: Path | None) -> None:
     """Measure speed, as ratios within one run."""
