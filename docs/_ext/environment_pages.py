@@ -27,8 +27,8 @@ def page(env_id: str, picture: str) -> str:
     env = gym.make(env_id)
     facts = [
         ("Create", f'`gymnasium.make("{env_id}")`'),
-        ("Action space", f"`{env.action_space}`"),
-        ("Observation space", f"`{env.observation_space}`"),
+        ("Action space", describe(env.action_space)),
+        ("Observation space", describe(env.observation_space)),
         ("Steps at most", str(spec.max_episode_steps)),
         (
             "Batched",
@@ -38,6 +38,14 @@ def page(env_id: str, picture: str) -> str:
     env.close()
     table = "| | |\n| --- | --- |\n" + "\n".join(f"| {key} | {value} |" for key, value in facts)
     return f"# {env_id}\n\n{summary}\n\n![A frame of {env_id}]({picture})\n\n{table}\n\n{as_markdown(body)}\n"
+
+
+def describe(space: gym.Space) -> str:
+    """A space in a line; bounds that differ between entries are left to the page."""
+    text = str(space)
+    if isinstance(space, gym.spaces.Box) and "\n" in text:
+        text = f"Box({space.shape}, {space.dtype})"
+    return f"`{text}`"
 
 
 def as_markdown(body: str) -> str:
