@@ -805,6 +805,32 @@ def test_partners_and_predictors_of_ones_own():
     assert make(partner={"threshold": 0.3}).unwrapped.view().threshold == 0.3
 
 
+@pytest.mark.filterwarnings("ignore:.*matplotlib")
+def test_playable_by_hand(monkeypatch):
+    """``gymnasium.utils.play`` accepts the environment and its keys; with them a cube is fetched."""
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    import pygame
+    from gymnasium.utils.play import PlayableGame
+
+    env = make(render_mode="rgb_array")
+    env.reset(options={"start": np.add(TASK.layout.place(FIRST[0]), (0.05, -0.1))})
+    assert {pygame.K_UP, pygame.K_a} < PlayableGame(env, None).relevant_keys
+    keys = env.unwrapped.get_keys_to_action()
+    assert len(keys) == 16
+    assert all(env.action_space.contains(action) for action in keys.values())
+    for pressed in ([pygame.K_UP], [pygame.K_a], [pygame.K_s], [pygame.K_DOWN, pygame.K_RIGHT]):
+        before = env.unwrapped.hand
+        for _ in range(6):
+            env.step(keys[tuple(sorted(pressed))])
+        x, y = env.unwrapped.hand - before
+        expected = {pygame.K_UP: (0, 0.1), pygame.K_a: (-0.1, 0), pygame.K_s: (0, -0.1)}
+        assert (x, y) == pytest.approx(expected.get(pressed[0], (0.1 / math.sqrt(2), -0.1 / math.sqrt(2))), abs=1e-6)
+    env.reset(options={"start": np.add(TASK.layout.place(FIRST[0]), (0.0, -0.1))})
+    for _ in range(6):
+        assert env.step(keys[(pygame.K_w,)])[4]["holding"] is None
+    assert env.step(np.zeros(2))[4]["holding"] == FIRST[0]
+
+
 # -- what is recorded -------------------------------------------------------------------------------------------------
 
 

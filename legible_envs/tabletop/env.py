@@ -14,6 +14,7 @@ from legible_envs.errors import LayoutError
 from legible_envs.rollouts import Trajectory
 from legible_envs.specs import JsonSpec, check_options
 from legible_envs.tabletop.game import DT, RATE, TableGame
+from legible_envs.tabletop.keys import keys_to_action
 from legible_envs.tabletop.layout import TabletopLayout
 from legible_envs.tabletop.observations import Observer
 from legible_envs.tabletop.settings import TableSettings, read_start
@@ -446,6 +447,10 @@ class TabletopEnv(JsonSpec, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
     def team_measures(self) -> Mapping[str, float]:
         """Measures of the team so far; see :meth:`~legible_envs.tabletop.fluency.TeamMetrics.summary`."""
         return self._team.summary()
+
+    def get_keys_to_action(self) -> dict[tuple[int, ...], npt.NDArray[np.float32]]:
+        """Keys for ``gymnasium.utils.play`` (with ``noop=np.zeros(2)``): arrows or W A S D; let go to take and place."""
+        return keys_to_action(self.max_speed)
 
     def _info(self) -> dict[str, Any]:
         game = self._game
