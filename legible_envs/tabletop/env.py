@@ -129,7 +129,7 @@ class TabletopEnv(JsonSpec, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
     | `path_length`   | metres the hand has moved |
     | `time`          | seconds since the episode began |
     | `layout_id`     | twelve hexadecimal digits that identify the layout |
-    | `belief`        | with a predictor or partner: `{goal: probability}` of the present reach, None where there is none |
+    | `belief`        | with a predictor or partner: `{goal: probability}` of the present reach, empty where there is none |
     | `robot_state`, `robot_target` | with a partner: what it does, and with which object |
     | `completion_time`, `human_idle`, `robot_idle`, `concurrent_activity`, `functional_delay`, `conflicts`, `goals_lost`, `decision_time`, `decision_fraction`, `decided`, `decided_rightly` | with a partner: measures of the team so far, see `legible_envs.tabletop.fluency`; None where not known yet |
 
@@ -449,7 +449,7 @@ class TabletopEnv(JsonSpec, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
         return self._team.summary()
 
     def get_keys_to_action(self) -> dict[tuple[int, ...], npt.NDArray[np.float32]]:
-        """Keys for ``gymnasium.utils.play`` (with ``noop=np.zeros(2)``): arrows or W A S D; let go to take and place."""
+        """Keys for ``gymnasium.utils.play`` (``noop=np.zeros(2)``): arrows or W A S D; let go to take and place."""
         return keys_to_action(self.max_speed)
 
     def _info(self) -> dict[str, Any]:

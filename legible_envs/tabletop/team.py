@@ -170,7 +170,8 @@ class Team:
         """What ``info`` says about belief and robot; None where a measure is not known yet."""
         if not self.is_there:
             return {}
-        info: dict[str, Any] = {"belief": None if self.belief is None else dict(self.belief)}
+        # A mapping in any case: vector environments cannot stack one with None.
+        info: dict[str, Any] = {"belief": dict(self.belief or {})}
         if self.command is not None:
             summary = self._metrics.summary()
             info |= {name: summary[name] if math.isfinite(summary[name]) else None for name in MEASURES}
