@@ -1,4 +1,4 @@
-"""Tables on the command line and in reports: how one is named, scored, printed and drawn; the boards of a search."""
+"""Tables on the command line and in reports: how one is named, scored, printed and drawn."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Final
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from benchmarks.boards import CONDITIONS, LIST, beta_of, boards_of, listed, write_boards
 from benchmarks.console import number, table_text
 from benchmarks.presenters import Design, Part, Presenter, as_genome, load_design, read_source, refuse
-from benchmarks.runs import Run, RunError, is_run_folder, read_run
+from benchmarks.runs import Run, is_run_folder
 from legible_envs.errors import LayoutError
 from legible_envs.files import write_atomically
 from legible_envs.tabletop import TabletopLayout, TabletopTask
@@ -27,24 +28,7 @@ if TYPE_CHECKING:
     from legible_envs.tabletop.scoring import TabletopScorer
     from predictors import GoalPredictor
 
-__all__ = [
-    "CONDITIONS",
-    "TableDesign",
-    "TablePresenter",
-    "boards_of",
-    "is_table",
-    "load_table",
-    "table_from",
-    "write_boards",
-]
-
-CONDITIONS: Final = {
-    "placement": "Placement Optimized",
-    "obstacles": "Virtual Obstacle Optimized",
-    "both": "Both Optimized",
-}
-"""Conditions of the workspace and their titles, in the order of the paper's figure."""
-_LIST: Final = "conditions.json"
+__all__ = ["TableDesign", "TablePresenter", "is_table", "load_table", "table_from"]
 
 
 @dataclass(frozen=True)
@@ -125,7 +109,7 @@ class TableDesign(Design):
         """The table with its shortest reaches, coloured by how unsure an observer is of their goal."""
         from legible_envs.tabletop.rendering import draw_table
 
-        return draw_table(self.layout, task=self.task, width=960, doubt=True, beta=_beta(self.workspace), grown=True)
+        return draw_table(self.layout, task=self.task, width=960, doubt=True, beta=beta_of(self.workspace), grown=True)
 
     def write_picture(self, path: Path | None) -> tuple[str, Path] | None:
         """For a run the boards, into its folder unless told otherwise; else the table."""
@@ -153,17 +137,13 @@ class TableDesign(Design):
         """The heuristic, and Eq. 1 of the paper."""
         from predictors import StraightLineBayesian
 
-        beta = _beta(self.workspace)
+        beta = beta_of(self.workspace)
         straight = StraightLineBayesian(beta, obstacles=False)
         return [("straight lines", straight), ("Eq. 1, shortest paths", StraightLineBayesian(beta))]
 
     def was_walked(self, walk: Trajectory) -> bool:
         """Whether the reach was made among these things."""
         return walk.layout == self.layout
-
-
-def _beta(workspace: Any) -> float:
-    return 20.0 if workspace is None else float(workspace.beta)
 
 
 # -- reading tables ----------------------------------------------------------------------------------------------------
@@ -241,73 +221,6 @@ def _task_of(layout: TabletopLayout, named: str | None) -> TabletopTask:
     )
 
 
-# -- the boards of a search ------------------------------------------------------------------------------------------
-
-
-def boards_of(run: Run) -> list[Condition]:
-    """The sorted baseline and the best layout of every condition searched in a run's folder.
-
-    A condition whose search has not found anything yet is left out.
-    """
-    from benchmarks.report import Condition
-
-    runs = {run.config["workspace"]["condition"]: run}
-    for name, folder in _listed(run.folder).items():
-        if folder != ".":
-            try:
-                runs[name] = read_run(run.folder / folder)
-                _ = runs[name].best_genome
-            except RunError:
-                runs.pop(name, None)
-    baseline, scorer = run.workspace.baseline, run.workspace.scorer
-    found = [("Baseline", baseline, "objects sorted by colour and shape")]
-    for name, title in CONDITIONS.items():
-        if name in runs:
-            layout = runs[name].workspace.decode(runs[name].best_genome)
-            count = len(layout.obstacles)
-            note = f"the best layout found, with {count} virtual obstacle{'' if count == 1 else 's'}"
-            found.append((title, layout, "the best layout found" if name == "placement" else note))
-    conditions = []
-    for title, layout, note in found:
-        scores = scorer.layout(layout)
-        score = float(scores.legibility[0])
-        conditions.append(
-            Condition(
-                name=title,
-                layout=layout,
-                score=score,
-                distance=float(scores.distance[0]),
-                normalised=score / scorer.best_possible,
-                note=note,
-                detour=float(scores.mean_detour[0]),
-            )
-        )
-    return conditions
-
-
-def write_boards(run: Run, path: Path | None = None) -> Path:
-    """Write the figure of a run's boards and the desired configuration; ``boards.png`` in its folder if no path."""
-    from legible_envs.tabletop.rendering import draw_boards, save_png
-
-    workspace = run.workspace
-    boards = {condition.name: condition.layout for condition in boards_of(run)}
-    picture = draw_boards(boards, workspace.task, scorer=workspace.scorer, beta=_beta(workspace))
-    return save_png(path or run.folder / "boards.png", picture)
-
-
-def _listed(folder: Path) -> dict[str, str]:
-    """Conditions searched together, each with its folder; empty where there is one only."""
-    try:
-        data = json.loads((folder / _LIST).read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        return {}
-    except ValueError as error:
-        raise RunError(f"{folder / _LIST} is not valid JSON: {error}") from error
-    if not isinstance(data, dict) or not set(data) <= set(CONDITIONS):
-        raise RunError(f"{folder / _LIST} must map conditions {list(CONDITIONS)} to folders")
-    return {str(key): str(value) for key, value in data.items()}
-
-
 class TablePresenter(Presenter):
     """Presents the workspace ``"tabletop"``."""
 
@@ -356,21 +269,21 @@ class TablePresenter(Presenter):
         from legible_envs.workspace import make_workspace
 
         asked = settings.get("condition")
-        listed = _listed(out) if settings["resume"] else {}
-        if asked == "all" or (asked is None and listed):
-            listed = listed or {"both": ".", "placement": "placement", "obstacles": "obstacles"}
+        together = listed(out) if settings["resume"] else {}
+        if asked == "all" or (asked is None and together):
+            together = together or {"both": ".", "placement": "placement", "obstacles": "obstacles"}
             parts = [
                 Part(out / folder, make_workspace({**config, "condition": name}), CONDITIONS[name])
-                for name, folder in listed.items()
+                for name, folder in together.items()
             ]
-            text = json.dumps(listed, indent=1) + "\n"
+            text = json.dumps(together, indent=1) + "\n"
             out.mkdir(parents=True, exist_ok=True)
-            write_atomically(out / _LIST, lambda stream: stream.write(text.encode()))
+            write_atomically(out / LIST, lambda stream: stream.write(text.encode()))
             return parts
         chosen = config if asked is None else {**config, "condition": asked}
         part = Part(out, make_workspace(chosen))
         if not settings["resume"]:
-            (out / _LIST).unlink(missing_ok=True)
+            (out / LIST).unlink(missing_ok=True)
         return [part]
 
     def text(self, console: Console, layout: TabletopLayout) -> RenderableType:
@@ -381,7 +294,7 @@ class TablePresenter(Presenter):
         """The table with its shortest reaches and where their goals are in doubt."""
         from legible_envs.tabletop.rendering import draw_table
 
-        return draw_table(layout, task=workspace.task, width=960, doubt=True, beta=_beta(workspace))
+        return draw_table(layout, task=workspace.task, width=960, doubt=True, beta=beta_of(workspace))
 
     def write_boards(self, run: Run, path: Path | None = None) -> Path:
         """Write the boards of the paper's figure."""
@@ -469,7 +382,7 @@ class TablePresenter(Presenter):
 
         return [
             [[*_mm(point), round(100 * doubt)] for point, doubt in zip(reach.points, [*reach.doubt, 0.0], strict=True)]
-            for reach in doubtful_reaches(layout, workspace.task, beta=_beta(workspace), pieces=24)
+            for reach in doubtful_reaches(layout, workspace.task, beta=beta_of(workspace), pieces=24)
         ]
 
 
