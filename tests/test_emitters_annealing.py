@@ -105,8 +105,26 @@ def test_default_cycles_fill_the_budget(evaluations, initial):
     emitter = AnnealingEmitter(make_archive(SHELF), SHELF, evaluations=evaluations, initial=initial)
     left = evaluations - min(initial, evaluations // 2)
     assert 4 <= emitter.chains <= 16
-    assert emitter.cycle >= 50_000 or emitter.cycle == max(1, left)
-    assert left % emitter.cycle < max(1, left // emitter.cycle)
+    assert 1 <= emitter.groups <= 8
+    assert emitter.cycle >= 16 * 6**2 or emitter.cycle == max(1, left)
+    together = emitter.groups * emitter.cycle
+    assert left % together < max(1, left // together) * emitter.groups
+
+
+def test_groups_resample_within_themselves():
+    archive, evaluate = started()
+    emitter = AnnealingEmitter(archive, SHELF, chains=8, groups=5, cycle=800, resamplings=10, seed=5)
+    foreign = 0
+    for step in range(100):
+        before = emitter._scores.reshape(5, 8).copy()
+        genomes = emitter.ask()
+        after = emitter._scores.reshape(5, 8)
+        if step:
+            assert all(np.isin(now, then).all() for now, then in zip(after, before, strict=True))
+            foreign += (~np.isin(before[1:], before[0])).sum()
+        scores, measures = evaluate(genomes)
+        emitter.tell(genomes, scores, measures, archive.add(genomes, scores, measures))
+    assert foreign > 100  # groups do hold what others lack
 
 
 @pytest.mark.slow
@@ -120,7 +138,8 @@ def test_annealing_beats_climbing_at_equal_evaluations():
 
 
 @pytest.mark.parametrize(
-    "bad", [{"chains": 0}, {"cycle": 0}, {"heat": 0.0}, {"cold": 0.0}, {"initial": 0}, {"resamplings": -1}]
+    "bad",
+    [{"chains": 0}, {"cycle": 0}, {"groups": 0}, {"heat": 0.0}, {"cold": 0.0}, {"initial": 0}, {"resamplings": -1}],
 )
 def test_a_bad_argument_is_named(bad):
     with pytest.raises(ValueError, match=next(iter(bad))):

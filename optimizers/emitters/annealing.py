@@ -16,9 +16,10 @@ if TYPE_CHECKING:
 __all__ = ["AnnealingEmitter"]
 
 _CALIBRATION = 1000
-_CYCLE = 50_000
-_STEPS = 3000
+_PER_GENE_PAIR = 16
+_STEPS = 600
 _CHAINS = 16
+_GROUPS = 8
 Array = npt.NDArray[np.float64]
 
 
@@ -35,29 +36,32 @@ class AnnealingEmitter(EmitterBase):
     valleys give their evaluations to those in promising ones.
 
     ``chains`` walks start from random elites, every archive cell equally likely, and cool together over ``cycle``
-    evaluations; then others start. The temperature falls linearly from ``heat`` to ``heat * cold`` times the typical
-    change of score: the median absolute difference between a layout and its perturbation, taken over the first
+    evaluations; then others start. Several such groups run side by side and know nothing of one another: each may end
+    in another valley, and batches are larger. The temperature falls linearly from ``heat`` to ``heat * cold`` times the
+    typical change of score: the median absolute difference between a layout and its perturbation, taken over the first
     thousand that differ. The emitter thus knows nothing of the unit of the objective.
 
     Args:
         archive: Archive of the search.
         workspace: The design problem; must offer ``sample``, ``perturb`` and ``phases``. Where it has several phases,
             each step is made in one drawn at random.
-        chains: Walks in lockstep. Default one for each 3,000 evaluations of a cycle, 4 to 16.
-        cycle: Evaluations from hot to cold. Default 50,000, or what makes whole cycles of at least that within
-            ``evaluations`` (a smaller budget is one cycle).
+        chains: Walks of a group. Default one for each 600 evaluations of a cycle, 4 to 16.
+        cycle: Evaluations of a group from hot to cold. Default 16 for each pair of genes (50,000 in a 9x9 kitchen), or
+            what makes whole cycles of at least that within ``evaluations`` (a smaller budget is one cycle).
+        groups: Groups side by side. Default as many as there are cycles within ``evaluations``, at most 8.
         resamplings: How often in a cycle walks are drawn anew; 0 leaves plain simulated annealing.
         heat: First temperature, in typical changes of score.
         cold: Last temperature, as a share of the first.
-        evaluations: Planned number of evaluations, used only for the default of ``cycle``.
+        evaluations: Planned number of evaluations, used only for the defaults of ``cycle`` and ``groups``.
         initial: Random layouts that come first: they are proposed while the archive is empty, and taken to be part of
             ``evaluations``.
         seed: Seed of this emitter's draws.
 
     Attributes:
-        chains: Walks in lockstep.
-        cycle: Evaluations from hot to cold.
-        cycles: Cycles begun so far.
+        chains: Walks of a group.
+        cycle: Evaluations of a group from hot to cold.
+        groups: Groups side by side.
+        cycles: Cycles begun so far, those side by side as one.
     """
 
     emits_valid = True
@@ -69,6 +73,7 @@ class AnnealingEmitter(EmitterBase):
         *,
         chains: int | None = None,
         cycle: int | None = None,
+        groups: int | None = None,
         resamplings: int = 30,
         heat: float = 0.35,
         cold: float = 0.03,
@@ -76,7 +81,7 @@ class AnnealingEmitter(EmitterBase):
         initial: int = 1000,
         seed: int | np.random.SeedSequence | None = None,
     ) -> None:
-        for name, value in (("chains", chains), ("cycle", cycle), ("initial", initial)):
+        for name, value in (("chains", chains), ("cycle", cycle), ("groups", groups), ("initial", initial)):
             if value is not None and value < 1:
                 raise ValueError(f"{name} must be at least 1, got {value}")
         if resamplings < 0:
@@ -92,16 +97,19 @@ class AnnealingEmitter(EmitterBase):
             lower_bounds=workspace.lower_bounds,
             upper_bounds=workspace.upper_bounds,
         )
-        self.cycle = _default_cycle(evaluations, int(initial)) if cycle is None else int(cycle)
+        size = int(archive.solution_dim)
+        planned_cycle, planned_groups = _plan(evaluations, int(initial), size)
+        self.cycle = planned_cycle if cycle is None else int(cycle)
+        self.groups = planned_groups if groups is None else int(groups)
         self.chains = max(4, min(_CHAINS, self.cycle // _STEPS)) if chains is None else int(chains)
         self.cycles = 0
         self._heat, self._cold, self._resamplings = float(heat), float(cold), int(resamplings)
         self._workspace = workspace
         self._initial = int(initial)
         self._rng = np.random.default_rng(seed)
-        # One row per walk: where it stands and what that scores.
-        self._genomes = np.zeros((self.chains, int(archive.solution_dim)), dtype=archive.dtypes["solution"])
-        self._scores: Array = np.zeros(self.chains)
+        # One row per walk, group by group: where it stands and what that scores.
+        self._genomes = np.zeros((self.groups * self.chains, size), dtype=archive.dtypes["solution"])
+        self._scores: Array = np.zeros(self.groups * self.chains)
         self._steps = max(1, self.cycle // self.chains)
         self._step = 0
         self._every = max(1, self._steps // resamplings) if resamplings else self._steps
@@ -114,6 +122,7 @@ class AnnealingEmitter(EmitterBase):
         return {
             "chains": self.chains,
             "cycle": self.cycle,
+            "groups": self.groups,
             "resamplings": self._resamplings,
             "heat": self._heat,
             "cold": self._cold,
@@ -131,12 +140,12 @@ class AnnealingEmitter(EmitterBase):
         return self._heat * float(np.median(self._changes)) * (1.0 - share * (1.0 - self._cold))
 
     def ask(self) -> npt.NDArray[Any]:
-        """Propose the next step of every walk: ``(chains, d)`` valid genomes."""
+        """Propose the next step of every walk: ``(groups * chains, d)`` valid genomes."""
         self._asked = not self.archive.empty
         if not self._asked:
             return self._workspace.sample(self._initial, self._rng)
         if self._step == 0:
-            self._genomes, self._scores = draw_elites(self.archive, self.chains, self._rng)
+            self._genomes, self._scores = draw_elites(self.archive, len(self._scores), self._rng)
             self.cycles += 1
         elif self._step % self._every == 0 and self.chains > 1:
             self._resample()
@@ -153,8 +162,8 @@ class AnnealingEmitter(EmitterBase):
         """Let every walk accept its step or stay.
 
         Args:
-            solution: ``(chains, d)`` what ``ask`` proposed.
-            objective: ``(chains,)`` scores, NaN where a layout is not allowed; no walk goes there.
+            solution: ``(groups * chains, d)`` what ``ask`` proposed.
+            objective: ``(groups * chains,)`` scores, NaN where a layout is not allowed; no walk goes there.
             measures: Not used.
             add_info: Not used.
             **fields: Not used.
@@ -172,18 +181,23 @@ class AnnealingEmitter(EmitterBase):
         self._step = (self._step + 1) % self._steps
 
     def _resample(self) -> None:
-        """Draw the walks anew, each in proportion to how its odds changed with the temperature."""
+        """Draw the walks of each group anew, each in proportion to how its odds changed with the temperature."""
         before, now = self._temperature(self._step - self._every), self.temperature
-        weights = np.exp((self._scores - self._scores.max()) * (1.0 / now - 1.0 / before))
-        ends = np.cumsum(weights) / weights.sum()
-        drawn = np.searchsorted(ends, (self._rng.random() + np.arange(self.chains)) / self.chains)
-        drawn = np.minimum(drawn, self.chains - 1)
-        self._genomes, self._scores = self._genomes[drawn], self._scores[drawn]
+        scores = self._scores.reshape(self.groups, self.chains)
+        weights = np.exp((scores - scores.max(axis=1, keepdims=True)) * (1.0 / now - 1.0 / before))
+        ends = np.cumsum(weights, axis=1) / weights.sum(axis=1, keepdims=True)
+        at = (self._rng.random((self.groups, 1)) + np.arange(self.chains)) / self.chains
+        drawn = np.stack([np.searchsorted(*pair) for pair in zip(ends, at, strict=True)])
+        rows = (np.minimum(drawn, self.chains - 1) + self.chains * np.arange(self.groups)[:, None]).ravel()
+        self._genomes, self._scores = self._genomes[rows], self._scores[rows]
 
 
-def _default_cycle(evaluations: int | None, initial: int) -> int:
-    """Whole cycles of at least ``_CYCLE`` in what follows the initial layouts; a smaller budget is one cycle."""
+def _plan(evaluations: int | None, initial: int, genome_size: int) -> tuple[int, int]:
+    """Length of a cycle, and groups side by side: whole cycles in what follows the initial layouts."""
+    least = _PER_GENE_PAIR * genome_size**2
     if evaluations is None:
-        return _CYCLE
+        return least, 1
     left = max(1, evaluations - min(initial, evaluations // 2))
-    return left // max(1, left // _CYCLE)
+    cycles = max(1, left // least)
+    groups = min(_GROUPS, cycles)
+    return left // (groups * (cycles // groups)), groups
