@@ -1,0 +1,26 @@
+"""Which search finds the most legible kitchens? Settings, run and analysis.
+
+The comparison of optimisers in Tung, Luebbers, Roncone and Hayes, *Workspace Optimization Techniques to Improve
+Prediction of Human Motion During Human-Robot Collaboration* (HRI 2024), with more optimisers, and at equal numbers of
+evaluations too.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from benchmarks.optimizer_comparison.analysis import sections
+    from benchmarks.optimizer_comparison.run import reproduce
+    from benchmarks.optimizer_comparison.sweep import FULL, QUICK, Settings
+
+__all__ = ["FULL", "QUICK", "Settings", "reproduce", "sections"]
+
+_HOME = {"FULL": "sweep", "QUICK": "sweep", "Settings": "sweep", "reproduce": "run", "sections": "analysis"}
+
+
+def __getattr__(name: str) -> object:
+    if name in _HOME:
+        return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

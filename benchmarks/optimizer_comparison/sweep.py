@@ -1,0 +1,116 @@
+"""The settings of the experiment, as data."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+__all__ = [
+    "FULL",
+    "METHODS",
+    "OPTIMUM_5X5",
+    "OURS",
+    "PAPER_METHODS",
+    "PUBLISHED",
+    "QUICK",
+    "Settings",
+    "cells_of",
+    "grid_name",
+]
+
+Shape = tuple[int, int]
+
+METHODS: Final = (
+    "annealing",
+    "improve",
+    "mutation",
+    "nslc",
+    "differential-evolution",
+    "cma-me",
+    "cma-mae",
+    "random",
+)
+"""Emitters compared, by their registered names; the first is our own, ``improve`` is the paper's MAP-Elites."""
+
+OURS: Final = "annealing"
+
+PAPER_METHODS: Final = {"improve": "MAP-Elites", "nslc": "NSLC", "differential-evolution": "DE"}
+"""The three of the paper, by what it calls them."""
+
+PUBLISHED: Final[Mapping[str, Mapping[str, float]]] = {
+    "MAP-Elites": {"5x5": -86.37, "7x7": -167.88, "9x9": -173.52, "5x9": -162.97},
+    "NSLC": {"5x5": -95.44, "7x7": -175.43, "9x9": -190.54, "5x9": -169.63},
+    "DE": {"5x5": -129.28, "7x7": -202.52, "9x9": -229.22, "5x9": -186.31},
+}
+"""Published mean best scores by method and grid. The unit differs from ours: ranks can be compared, values cannot."""
+
+OPTIMUM_5X5: Final = -11.684924681147868
+"""Best score of all valid 5x5 kitchens with ``prefix="sum"``, by exhaustive search."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What is run.
+
+    Attributes:
+        grids: Rows and columns of the kitchens.
+        seeds: Searches of each kind.
+        budgets: Equal numbers of evaluations, the random layouts every search begins with included. Each is a search of
+            its own, as emitters plan with their budget.
+        large: Larger budgets, and how many seeds at most: what takes time is run on two grids by two methods only.
+        large_grids: These grids.
+        large_methods: These methods.
+        iterations: Whether the paper's budgets in iterations are run too.
+        prefix: Which prefixes count in the score; see ``OvercookedWorkspace``.
+    """
+
+    grids: tuple[Shape, ...] = ((5, 5), (7, 7), (9, 9), (5, 9))
+    seeds: int = 10
+    budgets: tuple[int, ...] = (2_000, 20_000)
+    large: tuple[tuple[int, int], ...] = ((200_000, 10), (1_000_000, 5))
+    large_grids: tuple[Shape, ...] = ((9, 9), (5, 9))
+    large_methods: tuple[str, ...] = (OURS, "improve")
+    iterations: bool = True
+    prefix: str = "sum"
+
+
+FULL: Final = Settings()
+"""About twenty minutes on two idle cores: a million evaluations only for our emitter and the paper's, five seeds."""
+
+QUICK: Final = Settings(grids=((5, 5), (7, 7)), seeds=3, budgets=(2_000, 8_000), large=())
+"""A minute or two on two idle cores: small grids, three seeds, no large budgets."""
+
+PAPER_BUDGETS: Final[Mapping[str, dict[str, Any]]] = {
+    "improve": {"iterations": [100, 100], "options": {}},
+    "nslc": {"iterations": [20, 180], "options": {"population": 20}},
+    "differential-evolution": {"iterations": [20, 200], "options": {"population": 20}},
+}
+"""The paper's budgets: 100 random layouts and 100 climbs; ten generations of 20; 200 generations (of 20, which the
+paper does not say)."""
+
+
+def grid_name(shape: Shape) -> str:
+    """``"5x9"``: rows by columns."""
+    return f"{shape[0]}x{shape[1]}"
+
+
+def cells_of(settings: Settings) -> list[dict[str, Any]]:
+    """One cell per grid, budget, method and seed; those of small budgets first, so that a stop leaves whole tables."""
+    jobs: list[tuple[str, int | None, int, tuple[Shape, ...], tuple[str, ...]]] = []
+    if settings.iterations:
+        jobs.append(("paper", None, settings.seeds, settings.grids, tuple(PAPER_BUDGETS)))
+    jobs += [(f"{n}", n, settings.seeds, settings.grids, METHODS) for n in settings.budgets]
+    jobs += [
+        (f"{n}", n, min(seeds, settings.seeds), settings.large_grids, settings.large_methods)
+        for n, seeds in settings.large
+    ]
+    cells = []
+    for budget, evaluations, seeds, grids, methods in jobs:
+        for shape, seed, method in itertools.product(grids, range(seeds), methods):
+            how = PAPER_BUDGETS[method] if evaluations is None else {"iterations": None, "options": {}}
+            workspace = {"workspace": "overcooked", "shape": list(shape), "prefix": settings.prefix}
+            cell = {"grid": grid_name(shape), "budget": budget, "method": method, "seed": seed}
+            cells.append({**cell, "workspace": workspace, "evaluations": evaluations, **how})
+    return cells

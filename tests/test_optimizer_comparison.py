@@ -1,0 +1,148 @@
+"""The comparison of optimisers: its cells, its statistics against definitions, a whole small run from files."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from benchmarks.optimizer_comparison import FULL, QUICK, Settings, reproduce, sections
+from benchmarks.optimizer_comparison.analysis import anytime, beside_published, gaps, pairwise, summary
+from benchmarks.optimizer_comparison.run import run_cell
+from benchmarks.optimizer_comparison.sweep import METHODS, OPTIMUM_5X5, PUBLISHED, cells_of
+from legible_envs.overcooked import OvercookedLayout, OvercookedWorkspace
+from optimizers import list_emitters
+
+TINY = Settings(grids=((5, 5),), seeds=2, budgets=(300,), large=((400, 1),), large_grids=((5, 5),))
+
+
+def test_the_full_comparison_is_that_of_the_issue():
+    cells = cells_of(FULL)
+    assert {tuple(cell["workspace"]["shape"]) for cell in cells} == {(5, 5), (7, 7), (9, 9), (5, 9)}
+    assert {cell["budget"] for cell in cells} == {"paper", "2000", "20000", "200000", "1000000"}
+    assert {cell["method"] for cell in cells} == set(METHODS) <= set(list_emitters())
+    assert {cell["seed"] for cell in cells} == set(range(10))
+    assert all(cell["workspace"]["prefix"] == "sum" for cell in cells)
+    paper = {cell["method"]: cell["iterations"] for cell in cells if cell["budget"] == "paper"}
+    assert paper == {"improve": [100, 100], "nslc": [20, 180], "differential-evolution": [20, 200]}
+    assert len(cells) == len({str(cell) for cell in cells})
+    assert len(cells_of(QUICK)) < len(cells) / 4
+
+
+def test_nslc_in_the_papers_budget_is_ten_generations_of_twenty():
+    (cell,) = [c for c in cells_of(TINY) if c["method"] == "nslc" and c["budget"] == "paper" and c["seed"] == 0][:1]
+    rows = run_cell(cell)
+    assert rows[-1]["scored"] == 200
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("comparison")
+    tables = reproduce(folder, settings=TINY, workers=1)
+    assert tables == folder / "tables"
+    return folder
+
+
+def test_a_small_run_leaves_results_tables_and_figures(folder):
+    rows = pd.read_csv(folder / "searches.csv", dtype={"budget": str})
+    ends = rows[rows["moment"] == "end"]
+    assert len(ends) == len(cells_of(TINY)) == 2 * 3 + 2 * len(METHODS) + 2
+    for _, row in ends.head(6).iterrows():
+        shape = tuple(int(side) for side in row["grid"].split("x"))
+        workspace = OvercookedWorkspace(shape=shape, prefix="sum")
+        layout = OvercookedLayout.from_ascii(row["drawing"])
+        assert workspace.legibility(workspace.encode(layout)) == pytest.approx(row["best"])
+    assert {path.name for path in (folder / "tables").iterdir()} == {
+        f"{name}.csv" for name in ("summary", "pairs", "gaps", "published", "anytime")
+    }
+    assert {path.name for path in (folder / "figures").iterdir()} == {
+        "anytime_5x5_300.svg",
+        "anytime_5x5_400.svg",
+    }
+
+
+def test_analysis_reads_files_alone_and_says_what_came_out(folder, monkeypatch):
+    monkeypatch.setattr("optimizers.search", None)
+    before = {path.name: path.read_bytes() for path in (folder / "tables").iterdir()}
+    parts = sections(folder)
+    assert {path.name: path.read_bytes() for path in (folder / "tables").iterdir()} == before
+    words = " ".join(part.text for part in parts)
+    assert "5x5, 400 evaluations: no significant difference" in words
+    assert "rank as published on" in words
+    assert all(path.exists() for part in parts for path in part.figures)
+
+
+def test_running_it_again_runs_nothing(folder, monkeypatch):
+    monkeypatch.setattr("optimizers.search", None)
+    written = (folder / "searches.csv").read_bytes()
+    reproduce(folder, settings=TINY, workers=1)
+    assert (folder / "searches.csv").read_bytes() == written
+
+
+def test_one_seed_is_refused(tmp_path):
+    with pytest.raises(ValueError, match="2 seeds or more"):
+        reproduce(tmp_path, quick=True, seeds=1)
+
+
+# -- tables from made-up results ---------------------------------------------------------------------------------------
+
+
+def ends_of(scores, grid="5x5", budget="2000"):
+    rows = [
+        {"grid": grid, "budget": budget, "method": m, "seed": i, "scored": 2000, "best": b, "qd_score": 1.0}
+        for m, bests in scores.items()
+        for i, b in enumerate(bests)
+    ]
+    return pd.DataFrame(rows).assign(coverage=0.5, moment="end")
+
+
+def test_tests_and_effect_sizes_are_those_of_their_definitions():
+    rng = np.random.default_rng(0)
+    scores = {"annealing": rng.normal(2, 1, 10), "improve": rng.normal(0, 1, 10), "random": rng.normal(-3, 1, 10)}
+    table = pairwise(ends_of(scores))
+    assert list(zip(table["a"], table["b"], strict=True)) == [
+        ("annealing", "improve"),
+        ("annealing", "random"),
+        ("improve", "random"),
+    ]
+    for row in table.to_dict("records"):
+        a, b = scores[row["a"]], scores[row["b"]]
+        wins = (a[:, None] > b).mean() + 0.5 * (a[:, None] == b).mean()
+        assert row["superiority"] == pytest.approx(wins)
+        assert row["difference"] == pytest.approx(a.mean() - b.mean())
+        pooled = np.sqrt((a.var(ddof=1) + b.var(ddof=1)) / 2)
+        assert row["hedges_g"] == pytest.approx((a.mean() - b.mean()) / pooled * (1 - 3 / (4 * 18 - 1)))
+    p = np.sort(table["p"])
+    assert np.sort(table["p_holm"]) == pytest.approx(np.maximum.accumulate(np.minimum(p * [3, 2, 1], 1)))
+    same = pairwise(ends_of({"annealing": [1.0] * 4, "improve": [1.0] * 4}))
+    assert same["p"].item() == 1.0
+    assert same["superiority"].item() == 0.5
+    assert np.isnan(same["hedges_g"].item())
+
+
+def test_gaps_count_who_reaches_the_proven_optimum():
+    table = gaps(ends_of({"improve": [OPTIMUM_5X5, OPTIMUM_5X5 - 2.0], "random": [OPTIMUM_5X5 - 1.0] * 2}))
+    assert table["gap"].tolist() == pytest.approx([1.0, 1.0])
+    assert table["reached"].tolist() == [0.5, 0.0]
+    assert table["largest_gap"].tolist() == pytest.approx([2.0, 1.0])
+    assert gaps(ends_of({"improve": [0.0]}, grid="7x7")).empty
+
+
+def test_ranks_beside_the_published_ones():
+    ends = ends_of({"improve": [1.0, 1.0], "nslc": [2.0, 2.0], "differential-evolution": [0.0, 0.0], "random": [9.0]})
+    table = beside_published(ends).set_index("paper")
+    assert table["rank"].to_dict() == {"MAP-Elites": 2.0, "NSLC": 1.0, "DE": 3.0}
+    assert table["published_rank"].to_dict() == {"MAP-Elites": 1.0, "NSLC": 2.0, "DE": 3.0}
+    assert table.loc["DE", "published"] == PUBLISHED["DE"]["5x5"] == -129.28
+    assert beside_published(ends_of({"improve": [1.0], "nslc": [2.0]})).empty
+
+
+def test_summary_and_curves_over_seeds():
+    table = summary(ends_of({"improve": [1.0, 3.0, 8.0]}))
+    assert table["best"].item() == 4.0
+    assert table["best_sd"].item() == pytest.approx(np.std([1, 3, 8], ddof=1))
+    assert table["best_of_all"].item() == 8.0
+    logged = [(0, 100, 1.0), (0, 200, 5.0), (0, 400, 6.0), (1, 100, 3.0), (1, 350, 4.0), (1, 410, 8.0)]
+    rows = pd.DataFrame(logged, columns=["seed", "scored", "best"]).assign(
+        grid="5x5", budget="400", method="improve", moment="running"
+    )
+    curve = anytime(rows, points=3).set_index("scored")["best"]
+    assert curve.to_dict() == {100.0: 2.0, 200.0: 4.0, 400.0: 5.0}
