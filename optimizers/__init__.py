@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from optimizers.emitters.checks import check_emitter
     from optimizers.emitters.covariance import CmaMaeEmitter, CmaMeEmitter
     from optimizers.emitters.differential_evolution import DifferentialEvolutionEmitter
+    from optimizers.emitters.gradient_arborescence import GradientArborescenceEmitter
     from optimizers.emitters.improve import ImproveWorkspaceEmitter
     from optimizers.emitters.mutation import MutationEmitter
     from optimizers.emitters.novelty import NoveltyLocalCompetitionEmitter
@@ -33,6 +34,7 @@ _HOME = {
     "DifferentialEvolutionEmitter": "optimizers.emitters.differential_evolution",
     "EmitterError": "optimizers.errors",
     "Evaluator": "optimizers.evaluate",
+    "GradientArborescenceEmitter": "optimizers.emitters.gradient_arborescence",
     "ImproveWorkspaceEmitter": "optimizers.emitters.improve",
     "MutationEmitter": "optimizers.emitters.mutation",
     "NoveltyLocalCompetitionEmitter": "optimizers.emitters.novelty",
@@ -58,6 +60,7 @@ __all__ = [
     "DifferentialEvolutionEmitter",
     "EmitterError",
     "Evaluator",
+    "GradientArborescenceEmitter",
     "ImproveWorkspaceEmitter",
     "MutationEmitter",
     "NoveltyLocalCompetitionEmitter",

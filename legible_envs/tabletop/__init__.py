@@ -8,11 +8,13 @@ from legible_envs.tabletop.things import Table, TableObject, VirtualObstacle
 
 if TYPE_CHECKING:
     from legible_envs.tabletop.belief import EqOneBelief
+    from legible_envs.tabletop.differentiable import DifferentiableTable
     from legible_envs.tabletop.robot import RobotPartner
     from legible_envs.tabletop.scoring import TabletopScorer
     from legible_envs.tabletop.workspace import TabletopWorkspace
 
 __all__ = [
+    "DifferentiableTable",
     "EqOneBelief",
     "RobotPartner",
     "Table",
@@ -26,6 +28,7 @@ __all__ = [
 
 # Kernels need numba; the package must import without it.
 _LATE = {
+    "DifferentiableTable": "differentiable",
     "EqOneBelief": "belief",
     "RobotPartner": "robot",
     "TabletopScorer": "scoring",

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from legible_envs.tabletop.layout import TabletopLayout
 
-__all__ = ["greatest_spacing", "least_distances", "order_ranks"]
+__all__ = ["greatest_spacing", "least_distances", "mean_x", "order_ranks"]
 
 Floats = npt.NDArray[np.float64]
 
@@ -24,6 +24,11 @@ def least_distances(centres: Floats, fixed: npt.NDArray[np.bool_]) -> Floats:
     counts = ~(fixed[i] & fixed[j])
     gaps = np.hypot(*np.moveaxis(centres[:, i[counts]] - centres[:, j[counts]], -1, 0))
     return gaps.min(axis=1) if counts.any() else np.zeros(len(centres))
+
+
+def mean_x(centres: Floats, ranked: Sequence[int]) -> Floats:
+    """``(B,)`` mean ``x`` of some of ``centres (B, n, 2)``."""
+    return np.asarray(centres[:, ranked, 0].mean(axis=1))
 
 
 def order_ranks(centres: Floats, ranked: Sequence[int]) -> npt.NDArray[np.int64]:

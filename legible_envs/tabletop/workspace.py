@@ -6,7 +6,7 @@ import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -22,14 +22,16 @@ from legible_envs.tabletop.layout import MAX_OBSTACLES, TabletopLayout
 from legible_envs.tabletop.scoring import TableScores, TabletopScorer
 from legible_envs.tabletop.task import TabletopTask, task_names
 from legible_envs.tabletop.things import OBSTACLE_SIZE, numbers
-from legible_envs.workspace import Array, Workspace, as_batch, as_single, check_choice
+from legible_envs.workspace import Array, ObjectiveName, Workspace, as_batch, as_single, check_choice
 
 __all__ = ["Condition", "TabletopWorkspace"]
 
 Condition = Literal["both", "placement", "obstacles"]
+SecondMeasure = Literal["order", "mean x"]
 CONDITIONS: tuple[Condition, ...] = ("both", "placement", "obstacles")
 MAX_SAMPLE_TRIES = 2_000_000
 CELL = 0.01
+WIDE_CELL = 0.02
 
 
 class TabletopWorkspace(Workspace):
@@ -47,6 +49,8 @@ class TabletopWorkspace(Workspace):
     Measures are the least distance between two objects (pairs that both stay are left out; cells of about 1 cm), and
     the lexicographic rank of the order of the ranked objects from left to right (ties by ``y``, nearer first, then by
     position). Under ``"obstacles"`` these are constant; there they are the number of obstacles and the mean detour.
+    A rank has no slope: for searches that climb gradients (:meth:`gradients`) the second measure may be the mean ``x``
+    of the ranked objects instead, in cells of 2 cm.
 
     Args:
         task: The task: the name of one that comes with the package, a :class:`~.TabletopTask`, its ``to_dict()``, or
@@ -70,6 +74,7 @@ class TabletopWorkspace(Workspace):
         tie_tolerance: Excess costs up to this tie, in metres.
         ranked: Objects whose order is the second measure, or ``"all"`` movable ones. Default: movable goals of what can
             be done first (the first column).
+        second_measure: ``"order"``, the rank; or ``"mean x"``, under ``"placement"`` only.
         step_sd: Standard deviation of a step along either axis, of an object or an obstacle, in metres. The paper
             says "variance 7 cm"; taken as a standard deviation of 7 cm.
         start_from: An existing table (a layout or its ``to_dict()``); it is the first of every sample, and where it
@@ -115,6 +120,7 @@ class TabletopWorkspace(Workspace):
         ties: Ties = "expected",
         tie_tolerance: float = 1e-9,
         ranked: Sequence[str] | str | None = None,
+        second_measure: SecondMeasure = "order",
         step_sd: float = 0.07,
         start_from: TabletopLayout | Mapping[str, Any] | None = None,
     ) -> None:
@@ -165,7 +171,12 @@ class TabletopWorkspace(Workspace):
         )
         self.ranked = self._checked_ranked(ranked)
         self.phases = 2 if condition == "both" else 1
-        self.measure_names = ("obstacles", "mean detour") if condition == "obstacles" else ("least distance", "order")
+        self.second_measure: SecondMeasure = check_choice("second_measure", second_measure, get_args(SecondMeasure))
+        if second_measure == "mean x" and condition != "placement":
+            raise ValueError(f"second_measure 'mean x' is for condition 'placement', not {condition!r}")
+        self.measure_names = (
+            ("obstacles", "mean detour") if condition == "obstacles" else ("least distance", second_measure)
+        )
         self._home: Array | None = None
         if self.start_from is not None:
             self._home = self.rules.encode(self.start_from)
@@ -308,7 +319,7 @@ class TabletopWorkspace(Workspace):
         return np.asarray(self.obstacle_cost * self.num_obstacles(genomes), dtype=np.float64)
 
     def measures(self, genomes: npt.NDArray[Any]) -> Array:
-        """``(n, 2)`` least distance of objects and rank of their order, or number of obstacles and mean detour."""
+        """``(n, 2)`` least distance of objects and rank of their order (or mean x), or obstacles and mean detour."""
         batch = self._as_float(genomes)
         if self.condition == "obstacles":
             mean = np.empty(len(batch))
@@ -316,9 +327,28 @@ class TabletopWorkspace(Workspace):
             return np.column_stack([self.num_obstacles(batch), mean])
         centres = self._centres(batch)
         ranked = [self.task.layout.index(name) for name in self.ranked]
-        return np.column_stack(
-            [measures.least_distances(centres, self.rules.arrays.fixed), measures.order_ranks(centres, ranked)]
-        )
+        second = measures.order_ranks if self.second_measure == "order" else measures.mean_x
+        return np.column_stack([measures.least_distances(centres, self.rules.arrays.fixed), second(centres, ranked)])
+
+    def gradients(self, genomes: npt.NDArray[Any], objective: ObjectiveName = "legibility") -> Array:
+        """Gradients of an objective and of both measures, for search that climbs them (needs PyTorch).
+
+        They are of the formulas, see :mod:`legible_envs.tabletop.differentiable`: rules are not looked at.
+
+        Args:
+            genomes: ``(n, d)``, valid or not.
+            objective: As for :meth:`objective`.
+
+        Returns:
+            ``(n, 3, d)`` per genome: of the objective, of the least distance, of the mean x.
+
+        Raises:
+            ImportError: PyTorch is not installed.
+            ValueError: The measures are not continuous: only those of ``second_measure="mean x"`` are.
+        """
+        from legible_envs.tabletop.differentiable import genome_gradients
+
+        return genome_gradients(self, self._as_float(genomes), objective)
 
     def _centres(self, batch: Array) -> Array:
         """``(n, objects, 2)`` centres of all objects."""
@@ -329,7 +359,7 @@ class TabletopWorkspace(Workspace):
     @property
     def order_names(self) -> tuple[str, ...]:
         """The ranked objects from left to right, by rank, in initials where these tell them apart."""
-        if self.condition == "obstacles":
+        if self.condition == "obstacles" or self.second_measure != "order":
             return ()
         initials = ["".join(part[0] for part in name.split("-")) for name in self.ranked]
         names = initials if len(set(initials)) == len(initials) else list(self.ranked)
@@ -341,7 +371,10 @@ class TabletopWorkspace(Workspace):
         (low, high), (start, end) = self.archive_ranges
         if self.condition == "obstacles":
             return self.rules.max_obstacles + 1, max(1, round((end - start) / 0.01))
-        return max(1, math.ceil((high - low) / CELL - 1e-6)), math.factorial(len(self.ranked))
+        second = math.factorial(len(self.ranked))
+        if self.second_measure == "mean x":
+            second = max(1, math.ceil((end - start) / WIDE_CELL - 1e-6))
+        return max(1, math.ceil((high - low) / CELL - 1e-6)), second
 
     @cached_property
     def archive_ranges(self) -> list[tuple[float, float]]:
@@ -355,7 +388,12 @@ class TabletopWorkspace(Workspace):
         high = measures.greatest_spacing(self.task.layout, ~self.rules.arrays.fixed)
         has_pairs = len(self.task.layout.objects) > 1
         low = self.rules.object_spacing if has_pairs else 0.0
-        return [(low, max(high, low + CELL)), (-0.5, math.factorial(len(self.ranked)) - 0.5)]
+        second = (-0.5, math.factorial(len(self.ranked)) - 0.5)
+        if self.second_measure == "mean x":
+            ends = self._centres(np.stack([self.rules.lower_bounds, self.rules.upper_bounds]))
+            left, right = measures.mean_x(ends, [self.task.layout.index(name) for name in self.ranked]).tolist()
+            second = (left, max(right, left + WIDE_CELL))
+        return [(low, max(high, low + CELL)), second]
 
     # -- one layout ----------------------------------------------------------------------------------------------------
 
@@ -449,6 +487,7 @@ class TabletopWorkspace(Workspace):
             "ties": self.ties,
             "tie_tolerance": self.tie_tolerance,
             "ranked": list(self.ranked),
+            "second_measure": self.second_measure,
             "step_sd": self.step_sd,
             "start_from": None if self.start_from is None else self.start_from.to_dict(),
         }

@@ -57,6 +57,7 @@ _registry = Registry(
         "cma-mae": "optimizers.emitters.covariance:CmaMaeEmitter",
         "cma-me": "optimizers.emitters.covariance:CmaMeEmitter",
         "differential-evolution": "optimizers.emitters.differential_evolution:DifferentialEvolutionEmitter",
+        "gradient-arborescence": "optimizers.emitters.gradient_arborescence:GradientArborescenceEmitter",
         "improve": "optimizers.emitters.improve:ImproveWorkspaceEmitter",
         "mutation": "optimizers.emitters.mutation:MutationEmitter",
         "nslc": "optimizers.emitters.novelty:NoveltyLocalCompetitionEmitter",
