@@ -41,6 +41,10 @@ class AnnealingEmitter(EmitterBase):
     typical change of score: the median absolute difference between a layout and its perturbation, taken over the first
     thousand that differ. The emitter thus knows nothing of the unit of the objective.
 
+    Measured on 9x9 kitchens with ``prefix="sum"``: best score 175.6 (sd 4.1) against 154.5 (5.8) of ``"improve"``, at
+    100,000 evaluations over the same ten seeds. Drawing walks anew matters there: one cycle of 50,000 evaluations ends
+    at 173.5 (5.8), without it at 163.1 (7.7). On 5x9, where two wide valleys compete, it was not shown to be better.
+
     Args:
         archive: Archive of the search.
         workspace: The design problem; must offer ``sample``, ``perturb`` and ``phases``. Where it has several phases,
