@@ -92,7 +92,7 @@ def test_what_recordings_do_not_tell_stays() -> None:
 
 def test_corners_of_obstacles_tell_their_price_and_nothing_of_bows() -> None:
     task = TabletopTask.named("columns")
-    walls = [VirtualObstacle((0.45, 0.45), 1.5), VirtualObstacle((0.63, 0.45), 1.5)]
+    walls = [VirtualObstacle((0.45, 0.45), 1.5), VirtualObstacle((0.57, 0.45), 1.5)]
     layout = TabletopLayout(task.layout.objects, walls, task.layout.table)
     layout.validate()
     calm = ReachModel(Person(corner_cost=0.35, bow_trial=0.0), bow_spread=0.0, bow_target=0.0, duration_spread=0.02)

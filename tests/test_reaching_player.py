@@ -16,7 +16,7 @@ from predictors import StraightLineBayesian
 
 assert legible_envs
 
-WALLS = [VirtualObstacle((0.45, 0.45), 1.5), VirtualObstacle((0.63, 0.45), 1.5), VirtualObstacle((0.27, 0.62), 1.6)]
+WALLS = [VirtualObstacle((0.45, 0.45), 1.5), VirtualObstacle((0.57, 0.45), 1.5), VirtualObstacle((0.33, 0.62), 1.6)]
 
 
 def walled() -> TabletopLayout:

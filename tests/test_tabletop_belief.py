@@ -17,7 +17,7 @@ from legible_envs.tabletop.belief import EqOne, EqOneBelief
 HOME = (0.60, 0.05)
 COLUMNS = TabletopTask.named("columns").layout
 WALLED = COLUMNS.with_obstacles(
-    [VirtualObstacle((0.27, 0.45)), VirtualObstacle((0.60, 0.22), 0.3), VirtualObstacle((0.63, 0.60), 1.5)]
+    [VirtualObstacle((0.33, 0.45)), VirtualObstacle((0.60, 0.22), 0.3), VirtualObstacle((0.57, 0.60), 1.5)]
 )
 
 
@@ -115,9 +115,9 @@ def test_objects_that_were_moved_count_where_they_are():
     pushed = TabletopLayout(objects, WALLED.obstacles)
     there = EqOneBelief(pushed, goals=goals, start=HOME)
     told = EqOneBelief(WALLED, goals=goals, positions=[moved[g] for g in goals], start=HOME)
-    for point in ((0.5, 0.2), (0.3, 0.5), (0.27, 0.45)):
+    for point in ((0.5, 0.2), (0.3, 0.5), (0.33, 0.45)):
         assert told.update(point) == there.update(point)
-    assert told.belief != EqOneBelief(WALLED, goals=goals, start=HOME).update((0.27, 0.45))
+    assert told.belief != EqOneBelief(WALLED, goals=goals, start=HOME).update((0.33, 0.45))
     same = EqOneBelief(WALLED, goals=goals, positions=[WALLED.place(g) for g in goals], start=HOME)
     assert same.update((0.5, 0.2)) == EqOneBelief(WALLED, goals=goals, start=HOME).update((0.5, 0.2))
 

@@ -355,7 +355,7 @@ def test_the_first_sample_gives_nothing_away() -> None:
 
 
 def with_walls() -> TabletopLayout:
-    walls = [VirtualObstacle((0.45, 0.45), 1.5), VirtualObstacle((0.63, 0.45), 1.5), VirtualObstacle((0.27, 0.62), 1.6)]
+    walls = [VirtualObstacle((0.45, 0.45), 1.5), VirtualObstacle((0.57, 0.45), 1.5), VirtualObstacle((0.33, 0.62), 1.6)]
     layout = COLUMNS.layout.with_obstacles(walls)
     layout.validate()
     return layout

@@ -19,7 +19,7 @@ from legible_envs.tabletop.steering import Steering
 
 COLUMNS = TabletopTask.named("columns")
 TEA = TabletopTask.named("tea")
-WALLED = COLUMNS.layout.with_obstacles([VirtualObstacle((0.27, 0.45)), VirtualObstacle((0.63, 0.45), 1.5)])
+WALLED = COLUMNS.layout.with_obstacles([VirtualObstacle((0.33, 0.45)), VirtualObstacle((0.57, 0.45), 1.5)])
 
 
 def shuffled(rng):

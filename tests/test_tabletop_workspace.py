@@ -261,8 +261,8 @@ def test_layouts_and_genomes_convert_both_ways(condition):
 
 def test_obstacles_that_look_the_same_have_one_genome():
     ws = TabletopWorkspace()
-    angles = (0.4, 0.4 + math.pi, 0.4 - math.pi, 0.4 + 4 * math.pi)
-    genomes = [ws.encode(ws.baseline.with_obstacles([VirtualObstacle((0.27, 0.45), a)])) for a in angles]
+    angles = (1.4, 1.4 + math.pi, 1.4 - math.pi, 1.4 + 4 * math.pi)
+    genomes = [ws.encode(ws.baseline.with_obstacles([VirtualObstacle((0.33, 0.45), a)])) for a in angles]
     np.testing.assert_allclose(genomes[1:], [genomes[0]] * 3, atol=1e-12)
 
 
@@ -314,7 +314,7 @@ def test_layouts_of_another_table_are_refused():
     assert rule_of(lambda: ws.encode(TabletopTask.named("tea").layout)) == "object"
     big = [TableObject(o.name, o.at, o.colour, o.shape, (0.05, 0.05)) for o in ws.baseline.objects]
     assert rule_of(lambda: ws.encode(TabletopLayout(big))) == "object"
-    thick = ws.baseline.with_obstacles([VirtualObstacle((0.27, 0.45), 0.0, (0.1, 0.1))])
+    thick = ws.baseline.with_obstacles([VirtualObstacle((0.33, 0.45), 0.0, (0.1, 0.1))])
     assert rule_of(lambda: ws.encode(thick)) == "obstacles"
 
 
@@ -382,7 +382,7 @@ def test_moves_are_gaussian_steps_of_one_or_a_few_or_swaps():
 
 def test_obstacles_are_added_removed_nudged_and_turned():
     ws = TabletopWorkspace()
-    two = [VirtualObstacle((0.27, 0.45), math.pi / 2), VirtualObstacle((0.63, 0.45), math.pi / 2)]
+    two = [VirtualObstacle((0.33, 0.45), math.pi / 2), VirtualObstacle((0.57, 0.45), math.pi / 2)]
     parent = ws.encode(ws.baseline.with_obstacles(two))
     children = ws.perturb(parent[None], 600, rng(5), phase=1)
     rows, before = children[:, 16:].reshape(-1, 4, 4), parent[16:].reshape(4, 4)
