@@ -340,6 +340,7 @@ def _range_quantile(level: float, count: int, freedom: int) -> float:
     return float(stats.studentized_range.ppf(level, count, freedom))
 
 
+@lru_cache(maxsize=8192)  # the same comparison is often asked for a table, a figure and a test
 def _range_tail(value: float, count: int, freedom: int) -> float:
     from scipy import stats
 

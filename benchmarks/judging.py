@@ -1,0 +1,152 @@
+"""Judging predictors on the people of one layout: the rows that experiments about conditions log.
+
+>>> from benchmarks.judging import Judge, judged_rows, make_judge
+>>> judge = make_judge(Judge("Eq. 1", "reach-bayesian").how)                    # doctest: +SKIP
+>>> judged_rows(judge, reaches, folds=4, repeats=3, seed=0)                    # doctest: +SKIP
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from legible_envs.rollouts import Trajectory
+    from predictors.base import GoalPredictor
+
+__all__ = ["Judge", "curve_rows", "judged_rows", "labelled", "make_judge"]
+
+Rows = list[dict[str, Any]]
+
+_TRIES = 1000
+
+
+@dataclass(frozen=True)
+class Judge:
+    """One predictor of a comparison.
+
+    Attributes:
+        label: What tables call it.
+        predictor: Its name, or ``"module:Class"``.
+        parameters: Its parameters.
+        learns: Whether more data can make it better, so that it has a learning curve.
+        repeats: Most repeats of a cross-validation, for those that take long; 0: as many as for others.
+    """
+
+    label: str
+    predictor: str
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    learns: bool = True
+    repeats: int = 0
+
+    @property
+    def how(self) -> dict[str, Any]:
+        """How to make it, as plain data for cells."""
+        return {"name": self.predictor, "parameters": dict(self.parameters)}
+
+
+def make_judge(how: Mapping[str, Any]) -> GoalPredictor:
+    """The predictor that :attr:`Judge.how` describes."""
+    from predictors.registry import make_predictor
+
+    return make_predictor(how["name"], **how["parameters"])
+
+
+def labelled(table: str, rows: pd.DataFrame) -> Rows:
+    """Rows of one of several tables, told apart by ``table``."""
+    return [{"table": table, **{str(k): v for k, v in row.items()}} for row in rows.to_dict("records")]
+
+
+def judged_rows(predictor: GoalPredictor, walks: Sequence[Trajectory], *, folds: int, repeats: int, seed: int) -> Rows:
+    """How well a predictor reads people, by stratified cross-validation.
+
+    Args:
+        predictor: Unfitted.
+        walks: Of one layout, with two goals or more to choose from.
+        folds: Of the cross-validation.
+        repeats: How often, with other splits.
+        seed: Of the splits.
+
+    Returns:
+        Rows of four tables: ``accuracy`` (``participant, fraction, correct, chance, walks``), ``start`` (the same by
+        where walks began in place of who walked), ``metrics`` (per fraction, weighted by goal) and ``confusion``
+        (``goal, predicted, count``: walks, mean over fractions and repeats).
+    """
+    from predictors.evaluation import evaluate
+
+    found = evaluate({"it": predictor}, walks, cv=folds, repeats=repeats, rare="keep", seed=seed)
+    each = found.table.assign(
+        chance=1 / found.table["candidates"],
+        start=np.array([walk.start for walk in walks])[found.table["trajectory"]],
+    )
+    count: dict[str, Any] = {"correct": ("correct", "mean"), "chance": ("chance", "mean")}
+    count["walks"] = ("trajectory", "nunique")
+    confusion = found.confusion.groupby(["goal", "predicted"])["count"].sum().reset_index()
+    confusion["count"] /= repeats * len(found.fractions)
+    return [
+        *labelled("accuracy", each.groupby(["participant", "fraction"], sort=False).agg(**count).reset_index()),
+        *labelled("start", each.groupby(["start", "fraction"], sort=False).agg(**count).reset_index()),
+        *labelled("metrics", found.metrics().drop(columns="predictor")),
+        *labelled("confusion", confusion),
+    ]
+
+
+def curve_rows(
+    predictor: GoalPredictor,
+    walks: Sequence[Trajectory],
+    *,
+    shares: Sequence[float],
+    repeats: int,
+    seed: int,
+    test_share: float = 0.25,
+) -> Rows:
+    """A predictor's learning curve: ``split, size, share, accuracy`` (mean over fractions).
+
+    Splits whose smallest training set never mentions some goal, so that it could not even be named, are drawn anew.
+
+    Args:
+        predictor: Unfitted.
+        walks: Of one layout.
+        shares: Of the walks not held out, to learn from.
+        repeats: Splits.
+        seed: Of the splits.
+        test_share: Share of the walks held out.
+
+    Raises:
+        ValueError: Hardly any split has a training set of the smallest share that mentions every goal.
+    """
+    from predictors.evaluation import learning_curve
+
+    rows: Rows = []
+    for split, number in enumerate(_usable_seeds(walks, min(shares), test_share, repeats, seed)):
+        curve = learning_curve(
+            {"it": predictor}, walks, sizes=list(shares), test_share=test_share, repeats=1, seed=number
+        )
+        means = curve.table.groupby("size")["accuracy"].mean()
+        for share, (size, accuracy) in zip(sorted(shares), means.items(), strict=True):
+            rows.append({"split": split, "size": size, "share": share, "accuracy": accuracy})
+    return rows
+
+
+def _usable_seeds(walks: Sequence[Trajectory], least: float, test_share: float, count: int, seed: int) -> list[int]:
+    from predictors.splits import nested_training_sets
+
+    seeds = np.random.default_rng(seed).integers(2**31, size=_TRIES).tolist()
+    names = {name for walk in walks for name in walk.candidates}
+    found: list[int] = []
+    for number in seeds:
+        pool, _ = nested_training_sets(walks, test_share, np.random.default_rng(number))
+        learned = [walks[i] for i in pool[: round(least * len(pool))]]
+        if {name for walk in learned for name in walk.candidates} == names:
+            found.append(number)
+        if len(found) == count:
+            return found
+    raise ValueError(
+        f"of {_TRIES} splits only {len(found)} have {least:.0%} of the walks mention every goal; {count} are needed: "
+        "begin with a larger share"
+    )
