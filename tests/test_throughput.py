@@ -17,9 +17,12 @@ from benchmarks.throughput import peers, run
 from benchmarks.throughput.analysis import to_markdown
 from benchmarks.throughput.measure import Figure, alternate, rate
 from benchmarks.throughput.peer_maxent_irl import tasks
+from benchmarks.throughput.peer_tabletop import stages_of, straight_line_loss, straight_line_losses
 from benchmarks.throughput.peers import IMITATION, IRL_MAXENT, OVERCOOKED_AI, Peer, PeerError, open_peer, opened
 from benchmarks.throughput.reading import noisy_walks, reading, save_problem
 from benchmarks.throughput.sweep import OPTIMUM_5X5, TARGETS, Settings, Target
+from benchmarks.throughput.tables import _episodes, replay, tables_with
+from legible_envs.tabletop import TabletopTask
 
 TINY = Settings(
     rounds=2,
@@ -33,6 +36,10 @@ TINY = Settings(
     fresh_starts=1,
     walks=60,
     evaluations=1,
+    tables=8,
+    table_climbs=(20, 2),
+    table_episodes=1,
+    table_people=1,
 )
 
 
@@ -87,6 +94,66 @@ def test_the_whole_benchmark_reports_every_promise(tmp_path: Path, monkeypatch: 
         assert f"| {figure.what} |" in text
         assert figure.what in stream.getvalue()
     assert "--peers" in text
+
+
+@pytest.mark.parametrize("obstacles", [0, 2, 4])
+def test_tables_have_the_obstacles_asked_for(obstacles: int) -> None:
+    workspace, genomes = tables_with(obstacles, 12)
+    assert (workspace.num_obstacles(genomes) == obstacles).all()
+    assert workspace.valid(genomes).all()
+    assert len(np.unique(genomes, axis=0)) == 12
+
+
+def loss_of(own: float, other: float, lasts: tuple[int, ...]) -> float:
+    """Of a reach to one of two goals at right angles, its last points seen being so many steps of 2 cm away."""
+    loss = 0.0
+    for share, last in zip((0.25, 0.5, 0.75), lasts, strict=True):
+        right, wrong = np.exp(own - (own - 0.02 * last)), np.exp(other - np.hypot(0.02 * last, other))
+        loss -= share * np.log(right / (right + wrong))
+    return float(loss)
+
+
+def test_the_loss_of_the_field_is_what_its_definition_says() -> None:
+    start, centres = np.zeros(2), np.array([[0.21, 0.0], [0.0, 0.11], [0.0, 0.31]])
+    # 11, 6 and 16 steps: 12, 7 and 17 points with the goal.
+    expected = loss_of(0.21, 0.11, (2, 5, 8)) + loss_of(0.11, 0.21, (0, 2, 4))
+    assert straight_line_loss(start, centres[:2], (0, 1), [[0, 1]]) == pytest.approx(expected, abs=1e-12)
+    assert straight_line_losses(start, centres[None, :2], [[0, 1]])[0] == pytest.approx(expected, abs=1e-12)
+    assert straight_line_loss(start, centres[:2], (0, 1), [[0], [1]]) == 0.0
+    # A second object of a label, farther away: reached for too, but never what others are mistaken for.
+    expected += loss_of(0.31, 0.21, (3, 7, 11))
+    assert straight_line_loss(start, centres, (0, 1, 1), [[0, 1]]) == pytest.approx(expected, abs=1e-12)
+
+
+def test_both_forms_of_the_fields_loss_agree() -> None:
+    task = TabletopTask.named("tea")
+    stages = stages_of(task)
+    assert [[task.layout.goals[i] for i in stage] for stage in stages] == [
+        ["cup", "teabag"],
+        ["kettle", "milk", "sugar"],
+    ]
+    rng = np.random.default_rng(0)
+    centres = rng.uniform((0.1, 0.2), (0.8, 0.7), (30, 5, 2))
+    start = np.array([0.6, 0.05])
+    centres[0, 0] = start + np.array([0.03, 0.0])  # nothing is seen of it at 25 %
+    centres[1, 0] = start + np.array([2.5, 0.0])  # seen up to 2 m only
+    one_by_one = [straight_line_loss(start, one, range(5), stages) for one in centres]
+    np.testing.assert_allclose(straight_line_losses(start, centres, stages), one_by_one, atol=1e-12)
+    # A legible table loses less than one on which everything lies the same way.
+    apart = np.array([[0.1, 0.3], [0.8, 0.3], [0.1, 0.3], [0.45, 0.7], [0.8, 0.3]])
+    same_way = start + np.linspace(0.3, 0.5, 5)[:, None] * [-0.6, 0.8]
+    losses = straight_line_losses(start, np.stack([apart, same_way]), stages)
+    assert losses[0] < losses[1]
+
+
+@pytest.mark.parametrize("arguments", [{}, {"partner": "robot"}])
+def test_what_people_did_at_tables_repeats_itself(arguments: dict[str, Any]) -> None:
+    env, layouts, recorded = _episodes(arguments, 2)
+    for seed, (layout, deeds) in enumerate(zip(layouts, recorded, strict=True)):
+        assert len(layout.obstacles) == 4
+        assert not replay(env, layout, seed, deeds[:-1])
+        assert replay(env, layout, seed, deeds)
+    env.close()
 
 
 def test_the_optimum_is_recognised() -> None:

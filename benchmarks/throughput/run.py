@@ -19,6 +19,7 @@ from benchmarks.throughput.peers import IMITATION, IRL_MAXENT, OVERCOOKED_AI, Pe
 from benchmarks.throughput.reaching import reaches
 from benchmarks.throughput.reading import evaluating, reading, save_problem
 from benchmarks.throughput.sweep import FULL, OPTIMUM_5X5, QUICK, Settings
+from benchmarks.throughput.tables import table_drawing, table_games, table_people, table_scoring, table_searching
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -50,6 +51,10 @@ def run_benchmark(
     figures: list[Figure] = []
     if not peers:
         remarks.append("Overcooked-AI, imitation and irl-maxent were not measured; --peers does.")
+    remarks.append(
+        "The cross-entropy at straight lines is what github.com/cairo-robotics/tabletop_workspace_opt scores tables "
+        "by, re-implemented (benchmarks/throughput/peer_tabletop.py): 15 observed points, no obstacles."
+    )
     with tempfile.TemporaryDirectory() as scratch, contextlib.ExitStack() as stack:
         running: dict[str, Peer] = {}
         if peers:
@@ -61,6 +66,11 @@ def run_benchmark(
             ("scoring layouts", lambda: scoring(settings)),
             ("searching", lambda: searching(settings)),
             ("playing", lambda: games(settings, game)),
+            ("scoring tables", lambda: table_scoring(settings)),
+            ("searching tables", lambda: table_searching(settings)),
+            ("playing at tables", lambda: table_games(settings)),
+            ("drawing tables", lambda: table_drawing(settings)),
+            ("people at tables", lambda: table_people(settings)),
             ("reading reaches", lambda: reaches(settings)),
             ("reading people", lambda: reading(settings, running, remarks)),
             ("judging predictors", lambda: evaluating(settings)),

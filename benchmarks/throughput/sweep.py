@@ -28,6 +28,11 @@ class Settings:
         fresh_starts: New processes for import and compile times.
         walks: Walks that predictors are cross-validated on.
         evaluations: How often.
+        tables: Tables scored per call.
+        table_obstacles: How many obstacles they have, one figure each.
+        table_climbs: Random tables, and climbs, of the searches for tables; by default those of the paper.
+        table_episodes: Episodes at tables that are played again and again.
+        table_people: Simulated people per call.
     """
 
     rounds: int = 7
@@ -42,6 +47,11 @@ class Settings:
     fresh_starts: int = 5
     walks: int = 500
     evaluations: int = 2
+    tables: int = 1024
+    table_obstacles: tuple[int, ...] = (0, 3, 4)
+    table_climbs: tuple[int, int] = (1_000, 1_000)
+    table_episodes: int = 3
+    table_people: int = 20
 
 
 FULL: Final = Settings()
@@ -86,6 +96,15 @@ TARGETS: Final[dict[str, Target]] = {
     "update n-gram": Target("<=", 100e-6),
     "update k-NN": Target("<=", 100e-6),
     "update logistic": Target("<=", 100e-6),
+    "score table 0": Target(">=", 150_000),
+    "score table 3": Target(">=", 25_000),
+    "score table 4": Target(">=", 18_000),
+    "score tea / tea loss": Target(">=", 1_000),
+    "table searches": Target("<=", 60.0),
+    "table env": Target(">=", 5_000),
+    "table env belief": Target(">=", 2_000),
+    "table env robot": Target(">=", 2_000),
+    "table frames": Target(">=", 60),
     "import": Target("<=", 0.3),
     "compile": Target("<=", 20.0),
 }
