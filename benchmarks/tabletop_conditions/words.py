@@ -104,8 +104,8 @@ def _starts(results: Results) -> str:
         return ""
     return (
         f"\n\nPredictors that learn look at motion relative to its start and hold reaches from home and from the "
-        f"assembly zone for one kind. From home, one reach in eight, the {results.predictors[0]} is right in "
-        f"{means['home']:.3f}, from the assembly zone in {means['assembly']:.3f}."
+        f"assembly zone for one kind. From home, where only the first reach of each person begins, the "
+        f"{results.predictors[0]} is right in {means['home']:.3f}, from the assembly zone in {means['assembly']:.3f}."
     )
 
 
@@ -206,6 +206,10 @@ def about_hypotheses(found: dict[str, Hypotheses]) -> str:
     from benchmarks.hypotheses import __doc__ as about
 
     parts = [" ".join((about or "").split("\n\n")[1].split())]
+    parts.append(
+        'Units are tables, and few: "not supported" means not shown with so many, not that there is no difference. '
+        "Sizes of effects stand beside every test."
+    )
     for treatment, result in found.items():
         first = result.tests[(result.tests["hypothesis"] == "H1") & (result.tests["control"] == "Baseline")]
         good = first[first["supported"]]["predictor"].tolist()
