@@ -233,6 +233,7 @@ class TablePresenter(Presenter):
         "axes": {
             "least distance": "least distance of two objects, m",
             "order": "order of the first objects, left to right",
+            "mean x": "mean x of the first objects, m",
             "obstacles": "virtual obstacles",
             "mean detour": "mean detour",
         },
