@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import importlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from benchmarks.cells import Event
+    from benchmarks.sections import Section
 
 __all__ = ["EXPERIMENTS", "Experiment", "reproduce", "run_experiment"]
 
@@ -22,13 +24,13 @@ class Experiment:
     """An experiment that one command runs.
 
     Attributes:
-        module: Its folder; offers ``reproduce(folder, *, quick, seeds, workers, scheduler, progress)`` and, in
-            ``analysis``, ``sections(folder)``.
+        modules: Its parts by the folder each writes to; a part offers ``reproduce(folder, *, quick, seeds, workers,
+            scheduler, progress)`` and, in ``analysis``, ``sections(folder)``.
         title: Of its report.
         lede: Below the title.
     """
 
-    module: str
+    modules: Mapping[str, str]
     title: str
     lede: str
 
@@ -37,19 +39,19 @@ _PEOPLE = "People are simulated or recorded here, not the paper's participants."
 
 EXPERIMENTS: Final = {
     "overcooked": Experiment(
-        "benchmarks.overcooked_conditions",
+        {".": "benchmarks.overcooked_conditions", "recorded": "benchmarks.recorded_people"},
         "Are legible kitchens read better?",
         "Random, efficient, legible-efficient and legible kitchens, and who can tell early what a cook reaches for. "
         f"{_PEOPLE}",
     ),
     "tabletop": Experiment(
-        "benchmarks.tabletop_conditions",
+        {".": "benchmarks.tabletop_conditions"},
         "Are legible tables read better, and does a robot profit?",
         "Sorted cubes, better places, virtual obstacles, and both; read by predictors, then shared with a robot. "
         f"{_PEOPLE}",
     ),
     "optimizers": Experiment(
-        "benchmarks.optimizer_comparison",
+        {".": "benchmarks.optimizer_comparison"},
         "Which search finds the most legible kitchens?",
         "Emitters under the same scheduler, at the paper's number of iterations and at equal numbers of evaluations.",
     ),
@@ -83,11 +85,24 @@ def run_experiment(
     from benchmarks.experiment_report import write_experiment_report
 
     experiment = EXPERIMENTS[name]
-    module = importlib.import_module(experiment.module)
-    module.reproduce(folder, quick=quick, seeds=seeds, workers=workers, scheduler=scheduler, progress=progress)
-    sections = importlib.import_module(f"{experiment.module}.analysis").sections(folder)
+    how = {"quick": quick, "seeds": seeds, "workers": workers, "scheduler": scheduler, "progress": progress}
+    sections = []
+    for part, module in experiment.modules.items():
+        sections += _run_part(module, folder / part, how)
     lede = experiment.lede + (" This is the quick version: few layouts, people and seeds." if quick else "")
     return write_experiment_report(folder, sections, title=experiment.title, lede=lede)
+
+
+def _run_part(module: str, folder: Path, how: Mapping[str, Any]) -> list[Section]:
+    """Run one part and read its sections; what needs recordings that are not there says so in the report."""
+    from benchmarks.sections import Section
+    from legible_envs.overcooked.recordings import RecordingsError
+
+    try:
+        importlib.import_module(module).reproduce(folder, **how)
+    except RecordingsError as error:
+        return [Section("Recorded people", f"Left out: {error}")]
+    return list(importlib.import_module(f"{module}.analysis").sections(folder))
 
 
 @click.command()

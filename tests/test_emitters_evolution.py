@@ -136,7 +136,7 @@ def test_evolution_strategies_climb_the_valley(name):
     options = {"strategies": 3, "batch_size": 20}
     result = search(workspace, emitter=name, evaluations=3000, initial=100, seed=0, emitter_options=options)
     sampled = search(workspace, emitter="random", evaluations=3000, initial=100, seed=0)
-    assert -result.best_objective < 0.1 * -sampled.best_objective
+    assert -result.best_objective < 0.3 * -sampled.best_objective
     assert result.config["emitter"]["settings"]["strategies"] == 3
 
 

@@ -255,7 +255,7 @@ def test_bad_walks_are_named():
         fit_rationality([Trajectory([(1, 4), (1, 2)], **good)])
     with pytest.raises(ValueError, match="row 1, column 4 to row 0, column 4"):
         fit_rationality([Trajectory([(1, 4), (0, 4)], **good)])
-    with pytest.raises(ValueError, match="no layout"):
+    with pytest.raises(ValueError, match="no kitchen"):
         fit_rationality([Trajectory([(1, 4), (1, 3)], candidates=("onion",))])
     with pytest.raises(ValueError, match="no step"):
         fit_rationality([])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 import sys
 import types
@@ -16,6 +17,7 @@ from benchmarks.cells import run_cells
 from benchmarks.cli import main
 from benchmarks.experiment_report import write_experiment_report
 from benchmarks.sections import Section, write_tables
+from legible_envs.overcooked.recordings import RecordingsError
 
 
 @pytest.fixture
@@ -38,7 +40,7 @@ def small_experiment(monkeypatch: pytest.MonkeyPatch) -> None:
     module.reproduce, analysis.sections = reproduce, sections
     monkeypatch.setitem(sys.modules, "small_experiment", module)
     monkeypatch.setitem(sys.modules, "small_experiment.analysis", analysis)
-    experiment = reproducing.Experiment("small_experiment", "Small?", "Few words.")
+    experiment = reproducing.Experiment({".": "small_experiment"}, "Small?", "Few words.")
     monkeypatch.setitem(reproducing.EXPERIMENTS, "overcooked", experiment)
 
 
@@ -65,9 +67,22 @@ def test_seeds_replace_the_experiments_own_number(small_experiment: None, tmp_pa
 
 def test_every_experiment_has_its_module() -> None:
     for experiment in reproducing.EXPERIMENTS.values():
-        module = __import__(f"{experiment.module}.analysis", fromlist=["sections"])
-        assert callable(module.sections)
-        assert callable(__import__(experiment.module, fromlist=["reproduce"]).reproduce)
+        for name in experiment.modules.values():
+            assert callable(importlib.import_module(f"{name}.analysis").sections)
+            assert callable(importlib.import_module(name).reproduce)
+
+
+def test_what_needs_recordings_says_that_they_are_missing(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def reproduce(folder: Path, **how: object) -> None:
+        raise RecordingsError("no recordings; run `legible humans fetch`")
+
+    module = types.ModuleType("needs_recordings")
+    module.reproduce = reproduce
+    monkeypatch.setitem(sys.modules, "needs_recordings", module)
+    experiment = reproducing.Experiment({"recorded": "needs_recordings"}, "Recorded?", "")
+    monkeypatch.setitem(reproducing.EXPERIMENTS, "overcooked", experiment)
+    page = reproducing.run_experiment("overcooked", tmp_path).read_text()
+    assert "Left out: no recordings" in page
 
 
 def test_the_page_holds_its_pictures_and_asks_for_nothing(tmp_path: Path) -> None:

@@ -24,7 +24,7 @@ def run_here(function: str, number: int, cell: Cell) -> Outcome:
 
 
 class ClusterPool:
-    """Runs cells on the workers of a Dask scheduler, two per thread in flight.
+    """Runs cells on the workers of a Dask scheduler, one per thread.
 
     A lost worker's cells are run elsewhere; results come back to this process, the only one that writes.
 
@@ -50,10 +50,10 @@ class ClusterPool:
                         ended = wait(list(running), timeout=_POLL, return_when="FIRST_COMPLETED").done
                 except TimeoutError:
                     ended = set()
+                # All at once: what is not fetched before its worker is lost has to be run again.
+                outcomes = [_outcome(future, running.pop(future)[0]) for future in ended]
                 yield self._working(running)
-                for future in sorted(ended, key=lambda f: running[f][0]):
-                    number, _ = running.pop(future)
-                    yield _outcome(future, number)
+                yield from sorted(outcomes, key=lambda outcome: outcome.number)
             yield {}
         finally:
             self._client.cancel(list(running))
@@ -64,8 +64,8 @@ class ClusterPool:
         self._queue.append((number, cell))
 
     def _submit(self, function: str, running: dict[Any, tuple[int, Cell]]) -> None:
-        """Keep every thread busy, but no more: what is not submitted cannot be lost, nor stuck behind a slow worker."""
-        room = max(1, 2 * sum(self._client.nthreads().values())) - len(running)
+        """A cell per thread, no more: what is not submitted cannot be lost, nor be stuck behind a slow worker."""
+        room = max(1, sum(self._client.nthreads().values())) - len(running)
         while self._queue and room > 0:
             number, cell = self._queue.popleft()
             running[self._client.submit(run_here, function, number, dict(cell), pure=False)] = (number, cell)

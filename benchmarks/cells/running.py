@@ -104,7 +104,8 @@ def run_cells(
             that workers can import, or its ``"module:name"``.
         cells: Settings and seed, one mapping of plain data each; equal ones are run once.
         folder: Where results are kept. Cells that have a result there are not run again; cells that failed are.
-        workers: Processes on this machine; all cores if None; 1 runs everything in this process.
+        workers: Processes on this machine; all cores if None; 1 runs everything in this process. A script of your own
+            that starts several needs the usual ``if __name__ == "__main__":``.
         scheduler: Address of a Dask scheduler, such as ``"tcp://10.0.0.1:8786"``, whose workers can import
             ``function``; wins over ``workers``.
         progress: Called with an :class:`Event` whenever something changes.
