@@ -198,4 +198,5 @@ def test_a_cluster_loses_a_worker_and_no_result(
     assert victim.wait(timeout=10) == -signal.SIGKILL
     alone = run_cells(cell_functions.draw, [{"seed": seed} for seed in range(12)], tmp_path / "alone", workers=1)
     assert table["value"].tolist() == alone[alone["step"] == 0]["value"].tolist()
-    assert len(marks_of(tmp_path)) in (12, 13), "at most the running cell was run twice"
+    run = len(marks_of(tmp_path))
+    assert 12 <= run <= 14, "run twice at most: the cell it was running, and one whose result was on its way"
