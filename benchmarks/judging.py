@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -62,7 +62,16 @@ def labelled(table: str, rows: pd.DataFrame) -> Rows:
     return [{"table": table, **{str(k): v for k, v in row.items()}} for row in rows.to_dict("records")]
 
 
-def judged_rows(predictor: GoalPredictor, walks: Sequence[Trajectory], *, folds: int, repeats: int, seed: int) -> Rows:
+def judged_rows(
+    predictor: GoalPredictor,
+    walks: Sequence[Trajectory],
+    *,
+    folds: int,
+    repeats: int,
+    seed: int,
+    starts: bool = True,
+    confusion_over: Literal["mean", "sum"] = "mean",
+) -> Rows:
     """How well a predictor reads people, by stratified cross-validation.
 
     Args:
@@ -71,11 +80,13 @@ def judged_rows(predictor: GoalPredictor, walks: Sequence[Trajectory], *, folds:
         folds: Of the cross-validation.
         repeats: How often, with other splits.
         seed: Of the splits.
+        starts: Whether to log accuracy by where walks began, too.
+        confusion_over: Whether confusions are the mean or the sum over fractions observed.
 
     Returns:
-        Rows of four tables: ``accuracy`` (``participant, fraction, correct, chance, walks``), ``start`` (the same by
+        Rows of tables: ``accuracy`` (``participant, fraction, correct, chance, walks``), ``start`` (the same by
         where walks began in place of who walked), ``metrics`` (per fraction, weighted by goal) and ``confusion``
-        (``goal, predicted, count``: walks, mean over fractions and repeats).
+        (``goal, predicted, count``: walks, mean over repeats, mean or sum over fractions).
     """
     from predictors.evaluation import evaluate
 
@@ -87,10 +98,11 @@ def judged_rows(predictor: GoalPredictor, walks: Sequence[Trajectory], *, folds:
     count: dict[str, Any] = {"correct": ("correct", "mean"), "chance": ("chance", "mean")}
     count["walks"] = ("trajectory", "nunique")
     confusion = found.confusion.groupby(["goal", "predicted"])["count"].sum().reset_index()
-    confusion["count"] /= repeats * len(found.fractions)
+    confusion["count"] /= repeats * (len(found.fractions) if confusion_over == "mean" else 1)
+    keys = {"accuracy": "participant", **({"start": "start"} if starts else {})}
+    by = {name: each.groupby([key, "fraction"], sort=False).agg(**count).reset_index() for name, key in keys.items()}
     return [
-        *labelled("accuracy", each.groupby(["participant", "fraction"], sort=False).agg(**count).reset_index()),
-        *labelled("start", each.groupby(["start", "fraction"], sort=False).agg(**count).reset_index()),
+        *(row for name, table in by.items() for row in labelled(name, table)),
         *labelled("metrics", found.metrics().drop(columns="predictor")),
         *labelled("confusion", confusion),
     ]

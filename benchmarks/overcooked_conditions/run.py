@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from benchmarks.cells import Event, run_cells
+from benchmarks.judging import judged_rows, labelled, make_judge
 from benchmarks.overcooked_conditions.sweep import (
     FULL,
     OBJECTIVES,
@@ -175,27 +176,10 @@ def read_people(cell: dict[str, Any]) -> Rows:
         (per fraction), ``confusion`` (in walks, summed over fractions, repeats averaged) and, for a predictor that
         learns costs, ``cost`` (of each cell, learned from all walks).
     """
-    from predictors.evaluation import evaluate
-    from predictors.registry import make_predictor
-
-    walks = simulate(cell)
-    predictor = make_predictor(cell["how"]["name"], **cell["how"]["parameters"])
-    found = evaluate(
-        {"it": predictor}, walks, cv=cell["folds"], repeats=cell["repeats"], rare="keep", seed=cell["seed"]
-    )
-    each = found.table.assign(chance=1 / found.table["candidates"]).groupby(["participant", "fraction"], sort=False)
-    accuracy = each.agg(correct=("correct", "mean"), chance=("chance", "mean"), walks=("trajectory", "nunique"))
-    counts = found.confusion.groupby(["goal", "predicted"])["count"].sum() / cell["repeats"]
-    return [
-        *_labelled("accuracy", accuracy.reset_index()),
-        *_labelled("metrics", found.metrics().drop(columns="predictor")),
-        *_labelled("confusion", counts.reset_index()),
-        *_costs(predictor, walks),
-    ]
-
-
-def _labelled(table: str, rows: pd.DataFrame) -> Rows:
-    return [{"table": table, **{str(k): v for k, v in row.items()}} for row in rows.to_dict("records")]
+    walks, predictor = simulate(cell), make_judge(cell["how"])
+    judging = {"folds": cell["folds"], "repeats": cell["repeats"], "seed": cell["seed"]}
+    rows = judged_rows(predictor, walks, **judging, starts=False, confusion_over="sum")
+    return [*rows, *_costs(predictor, walks)]
 
 
 def _costs(predictor: Any, walks: list[Trajectory]) -> Rows:
@@ -214,12 +198,9 @@ def _costs(predictor: Any, walks: list[Trajectory]) -> Rows:
 def learn_people(cell: dict[str, Any]) -> Rows:
     """A predictor's learning curve on a cell's people: accuracy (mean over fractions) per repeat and training share."""
     from predictors.evaluation import learning_curve
-    from predictors.registry import make_predictor
 
-    predictor = make_predictor(cell["how"]["name"], **cell["how"]["parameters"])
-    curve = learning_curve(
-        {"it": predictor}, simulate(cell), sizes=cell["shares"], repeats=cell["repeats"], seed=cell["seed"]
-    )
+    judged = {"it": make_judge(cell["how"])}
+    curve = learning_curve(judged, simulate(cell), sizes=cell["shares"], repeats=cell["repeats"], seed=cell["seed"])
     rows = curve.table.groupby(["repeat", "size"], as_index=False)["accuracy"].mean()
     share = dict(zip(sorted(rows["size"].unique()), sorted(cell["shares"]), strict=True))
-    return _labelled("curve", rows.assign(share=rows["size"].map(share)).rename(columns={"repeat": "split"}))
+    return labelled("curve", rows.assign(share=rows["size"].map(share)).rename(columns={"repeat": "split"}))

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+
+from benchmarks.judging import Judge
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -20,7 +22,6 @@ __all__ = [
     "PUBLISHED",
     "QUICK",
     "WALKERS",
-    "Judge",
     "Settings",
     "curve_cells",
     "layout_cells",
@@ -65,34 +66,13 @@ FITTED_SOURCE: Final = (
     "2,406 walks of 34 people in four kitchens, Overcooked-AI's published games of 2019 (Carroll et al., NeurIPS 2019)"
 )
 
-
-@dataclass(frozen=True)
-class Judge:
-    """One predictor of the comparison.
-
-    Attributes:
-        label: What tables call it.
-        predictor: Its name, or ``"module:Class"``.
-        parameters: Its parameters.
-        group: ``"paper"`` for those of the paper, ``"learned"`` for others.
-        learns: Whether more walks can make it better, so that it has a learning curve.
-        repeats: Of the cross-validation, where fewer than for others; 0 for as many.
-    """
-
-    label: str
-    predictor: str
-    parameters: Mapping[str, Any] = field(default_factory=dict)
-    group: str = "learned"
-    learns: bool = True
-    repeats: int = 0
-
-
 PREDICTORS: Final = (
-    Judge("Eq. 1, IRL costs", "bayesian", {"cell_costs": "learned"}, "paper"),
-    Judge("shortest distance", "shortest-distance", group="paper", learns=False),
+    Judge("Eq. 1, IRL costs", "bayesian", {"cell_costs": "learned"}),
+    Judge("shortest distance", "shortest-distance", learns=False),
     Judge("logistic", "grid-logistic"),
     Judge("k-NN", "grid-knn"),
 )
+"""The paper's two first."""
 NEURAL: Final = Judge("GRU", "recurrent", {"members": 2, "max_epochs": 40, "patience": 6, "device": "cpu"}, repeats=1)
 
 
@@ -229,7 +209,7 @@ def _with_people(
         "layout": number,
         "walker": walker,
         "predictor": judge.label,
-        "how": {"name": judge.predictor, "parameters": dict(judge.parameters)},
+        "how": judge.how,
         "drawing": str(place["drawing"]),
         "people": dict(numbers),
         "participants": settings.participants,
