@@ -24,6 +24,7 @@ __all__ = [
     "learning_by_condition",
     "round_up",
     "slug",
+    "stacked",
     "variance_rows",
 ]
 
@@ -42,6 +43,14 @@ def in_order(table: pd.DataFrame, **orders: Sequence[Any]) -> pd.DataFrame:
     """Rows sorted by columns whose values have an order; the first column counts most."""
     ranks = [table[name].map({value: i for i, value in enumerate(order)}).to_numpy() for name, order in orders.items()]
     return table.iloc[np.lexsort(ranks[::-1])].reset_index(drop=True)
+
+
+def stacked(parts: Mapping[str, pd.DataFrame], name: str) -> pd.DataFrame:
+    """Tables below one another, told apart by a first column."""
+    import pandas as pd
+
+    table = pd.concat([part.assign(**{name: key}) for key, part in parts.items()], ignore_index=True)
+    return table[[name, *(column for column in table if column != name)]]
 
 
 # -- tests ------------------------------------------------------------------------------------------------------------
@@ -97,12 +106,14 @@ def variance_rows(rows: pd.DataFrame, predictors: Sequence[str], shown: pd.DataF
 
 
 def accuracy_by_condition(
-    comparison: Comparison, conditions: Sequence[str], chance: float, title: str, subtitle: str
+    comparison: Comparison, conditions: Sequence[str], chance: float, title: str, subtitle: str, note: str = ""
 ) -> str:
-    """Accuracy against fraction observed, a line per condition, bands of Tukey's half-width."""
+    """Accuracy against fraction observed, a line per condition in the order given, bands of Tukey's half-width."""
     means = in_order(comparison.means, condition=conditions)
     table = means.rename(columns={"condition": "predictor", "mean": "accuracy"}).assign(chance=chance)
     table[["low", "high"]] = table[["low", "high"]].clip(0, 1)
+    if note:
+        table.attrs["evaluation"] = note
     return accuracy_figure(table, title=title, subtitle=subtitle)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from benchmarks.conditions import stacked
 from benchmarks.overcooked_conditions import figures, tables
 from benchmarks.overcooked_conditions.sweep import CONDITIONS, FITTED, FITTED_SOURCE, PREFERENCE, PUBLISHED
 from benchmarks.sections import Section, write_tables
@@ -39,9 +40,9 @@ def sections(folder: str | Path) -> list[Section]:
     metrics = tables.metrics_table(results)
     anova = tables.anova_table(results, best)
     hypotheses = tables.hypotheses_of(results)
-    tests = _by_walker({walker: found.tests for walker, found in hypotheses.items()})
-    verdicts = _by_walker({walker: found.verdicts() for walker, found in hypotheses.items()})
-    points = _by_walker({walker: found.points for walker, found in hypotheses.items()})
+    tests = stacked({walker: found.tests for walker, found in hypotheses.items()}, "people")
+    verdicts = stacked({walker: found.verdicts() for walker, found in hypotheses.items()}, "people")
+    points = stacked({walker: found.points for walker, found in hypotheses.items()}, "people")
     published = tables.beside_published(metrics, results.predictors[0])
     fitted = _people_table(results.fits)
     layouts = _layout_table(results.layouts)
@@ -88,13 +89,6 @@ def sections(folder: str | Path) -> list[Section]:
             drawn["confusion"],
         ),
     ]
-
-
-def _by_walker(parts: dict[str, pd.DataFrame]) -> pd.DataFrame:
-    import pandas as pd
-
-    table = pd.concat([part.assign(people=walker) for walker, part in parts.items()], ignore_index=True)
-    return table[["people", *(column for column in table if column != "people")]]
 
 
 # -- tables for the page ----------------------------------------------------------------------------------------------

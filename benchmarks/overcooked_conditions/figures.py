@@ -7,105 +7,32 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from benchmarks.conditions import (
+    accuracy_by_condition,
+    bars_by_condition,
+    compare_layouts,
+    learning_by_condition,
+    slug,
+)
 from benchmarks.overcooked_conditions import tables
 from benchmarks.overcooked_conditions.sweep import CONDITIONS
-from predictors.figures import (
-    COLOURS,
-    Drawing,
-    accuracy_figure,
-    confusion_figure,
-    footnote,
-    heading,
-    learning_curve_figure,
-    save_figure,
-    shade,
-)
+from predictors.figures import Drawing, confusion_figure, footnote, heading, save_figure, shade
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from legible_envs.tasks import TaskGraph
-    from predictors.statistics import Comparison
 
-__all__ = ["accuracy_by_condition", "behaviour_map", "beside_published_figure", "boards", "task_figure"]
+__all__ = ["behaviour_map", "boards", "draw_all", "rewards", "task_figure"]
 
-_INK, _SOFT, _RULE = "#24292f", "#5d6670", "#e3e6ea"
+_INK, _SOFT = "#24292f", "#5d6670"
 TILE: Final = 44
-
-
-def slug(*words: str) -> str:
-    """A name of a file."""
-    text = "_".join(words).lower()
-    return "".join(c if c.isalnum() else "_" for c in text).replace("__", "_").strip("_")
-
-
-# -- curves -----------------------------------------------------------------------------------------------------------
-
-
-def accuracy_by_condition(comparison: Comparison, chance: float, title: str, subtitle: str) -> str:
-    """Accuracy against fraction observed, a line per condition, bands of Tukey's half-width."""
-    table = comparison.means.rename(columns={"condition": "predictor", "mean": "accuracy"}).assign(chance=chance)
-    table[["low", "high"]] = table[["low", "high"]].clip(0, 1)
-    table.attrs["evaluation"] = (
-        "Simulated people; cross-validated; only walks with two valid goals or more. Two bands that do not overlap are "
-        "a difference by Tukey's test at that point."
-    )
-    return accuracy_figure(table, title=title, subtitle=subtitle)
-
-
-def learning_by_condition(curves: pd.DataFrame, predictor: str) -> str:
-    """Accuracy against walks learned from, a line per condition, bands of one standard deviation between layouts."""
-    own = curves[curves["predictor"] == predictor]
-    # Training sets differ by a walk or two between layouts: shares are what is equal.
-    sizes = own.groupby("share")["size"].mean().round().astype(int)
-    each = own.groupby(["condition", "share", "layout"], sort=False, as_index=False)["accuracy"].mean()
-    grouped = each.groupby(["condition", "share"], sort=False)["accuracy"]
-    table = grouped.agg(accuracy="mean", sd="std").reset_index()
-    table = table.sort_values("condition", key=lambda names: -names.map(CONDITIONS.index), kind="stable")
-    table = table.assign(
-        predictor=table["condition"],
-        size=table["share"].map(sizes),
-        low=(table["accuracy"] - table["sd"]).clip(0, 1),
-        high=(table["accuracy"] + table["sd"]).clip(0, 1),
-    )
-    return learning_curve_figure(
-        table,
-        title=f"What more walks buy: {predictor}",
-        subtitle="mean over fractions observed; bands: one standard deviation between layouts",
-    )
-
-
-def beside_published_figure(table: pd.DataFrame, predictor: str) -> str:
-    """F1 per condition: the paper's people beside each kind of simulated ones."""
-    series = [str(c).removeprefix("f1, ") for c in table if str(c).startswith("f1, ")]
-    width, height, left, top, bottom = 720.0, 360.0, 70.0, 84.0, 300.0
-    drawing = Drawing(width, height, "F1 by condition", f"F1 by condition: {', '.join(series)}.")
-    heading(
-        drawing, "F1 by condition, the paper's people and ours", f"ours: {predictor}, mean over 10 to 90 % observed"
-    )
-    for value in np.linspace(0, 1, 6):
-        y = bottom - value * (bottom - top)
-        drawing.line([(left, y), (width - 20, y)], _RULE if value else _SOFT)
-        drawing.text(left - 9, y + 4, f"{value:.1f}", "end", fill=_SOFT)
-    step = (width - 20 - left) / len(table)
-    bar = 0.72 * step / len(series)
-    for i, row in enumerate(table.to_dict("records")):
-        begin = left + step * i + 0.14 * step
-        for j, name in enumerate(series):
-            value = float(row[f"f1, {name}"])
-            x, y = begin + bar * j, bottom - value * (bottom - top)
-            colour = _SOFT if name == "paper" else COLOURS[j - 1]
-            drawing.box(x, y, bar - 3, bottom - y, colour, f"{row['condition']}, {name}: {value:.3f}")
-            drawing.text(x + (bar - 3) / 2, y - 5, f"{value:.2f}".lstrip("0"), "middle", font_size=11)
-        drawing.text(left + step * (i + 0.5), bottom + 20, str(row["condition"]), "middle", font_weight="600")
-    x = left
-    for j, name in enumerate(series):
-        said = "people of the paper" if name == "paper" else f"{name} people (simulated)"
-        drawing.box(x, 58, 12, 12, _SOFT if name == "paper" else COLOURS[j - 1])
-        drawing.text(x + 18, 68, said)
-        x += 40 + 7 * len(said)
-    footnote(drawing, "The paper's figures are of human participants and one layout per condition; see the text.")
-    return drawing.render()
+LEGIBLE_FIRST: Final = tuple(reversed(CONDITIONS))
+"""The legible condition is the one to look for."""
+_READ: Final = (
+    "Simulated people; cross-validated; only walks with two valid goals or more. Two bands that do not overlap are "
+    "a difference by Tukey's test at that point."
+)
 
 
 # -- maps and graphs --------------------------------------------------------------------------------------------------
@@ -243,7 +170,16 @@ def draw_all(results: tables.Results, folder: Path) -> dict[str, list[Path]]:
     best = tables.best_layouts(results)
     first = results.predictors[0]
     folder.mkdir(parents=True, exist_ok=True)
-    published = beside_published_figure(tables.beside_published(tables.metrics_table(results), first), first)
+    published = bars_by_condition(
+        tables.beside_published(tables.metrics_table(results), first),
+        {
+            "f1, paper": "people of the paper",
+            **{f"f1, {name}": f"{name} people (simulated)" for name in results.walkers},
+        },
+        "F1 by condition, the paper's people and ours",
+        f"ours: {first}, mean over 10 to 90 % observed",
+        "The paper's figures are of human participants and one layout per condition; see the text.",
+    )
     found = {
         "layouts": [
             save_png(folder / "layouts.png", boards(best)),
@@ -256,7 +192,10 @@ def draw_all(results: tables.Results, folder: Path) -> dict[str, list[Path]]:
         "accuracy": _accuracy_figures(results, folder),
         "confusion": _confusion_figures(results, best, folder),
         "curves": [
-            save_figure(folder / f"{slug('learning', name)}.svg", learning_by_condition(results.curves, name))
+            save_figure(
+                folder / f"{slug('learning', name)}.svg",
+                learning_by_condition(results.curves, name, LEGIBLE_FIRST, "walks"),
+            )
             for name in dict.fromkeys(results.curves["predictor"] if len(results.curves) else ())
         ],
     }
@@ -272,25 +211,17 @@ def _accuracy_figures(results: tables.Results, folder: Path) -> list[Path]:
     for walker in results.walkers:
         rows = tables.accuracy_rows(results, walker)
         for predictor in results.predictors:
-            each, _ = tables.compare_layouts(rows, predictor)
-            each = _ordered(each)
+            each, _ = compare_layouts(rows, predictor)
             svg = accuracy_by_condition(
                 each,
+                LEGIBLE_FIRST,
                 float(rows[rows["predictor"] == predictor]["chance"].mean()),
                 f"{predictor}, {walker} people",
                 f"mean over {int(each.means['n'].min())} layouts per condition; bands: Tukey's half-width over layouts",
+                _READ,
             )
             files.append(save_figure(folder / f"{slug('accuracy', walker, predictor)}.svg", svg))
     return files
-
-
-def _ordered(comparison: Comparison) -> Comparison:
-    """The legible condition first: it is the one to look for."""
-    import dataclasses
-
-    rank = {name: i for i, name in enumerate(reversed(CONDITIONS))}
-    means = comparison.means.assign(rank=comparison.means["condition"].map(rank)).sort_values("rank", kind="stable")
-    return dataclasses.replace(comparison, means=means.drop(columns="rank"))
 
 
 def _confusion_figures(results: tables.Results, best: pd.DataFrame, folder: Path) -> list[Path]:

@@ -6,15 +6,25 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from benchmarks.conditions import in_order, stacked, variance_rows
 from benchmarks.hypotheses import Hypotheses, assess_hypotheses
 from benchmarks.overcooked_conditions.sweep import CONDITIONS, PUBLISHED
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from predictors.statistics import Comparison
-
-__all__ = ["METRICS", "Results", "accuracy_rows", "best_layouts", "compare_layouts", "compare_people", "load_results"]
+__all__ = [
+    "METRICS",
+    "Results",
+    "accuracy_rows",
+    "anova_table",
+    "beside_published",
+    "best_layouts",
+    "confusion_of",
+    "hypotheses_of",
+    "load_results",
+    "metrics_table",
+]
 
 METRICS: Final = ("f1", "precision", "recall")
 
@@ -107,25 +117,6 @@ def accuracy_rows(results: Results, walker: str) -> pd.DataFrame:
     return rows[rows["walker"] == walker][columns].reset_index(drop=True)
 
 
-def compare_layouts(rows: pd.DataFrame, predictor: str) -> tuple[Comparison, Comparison]:
-    """Conditions with layouts as units, at each fraction and over all: the nested analysis of variance."""
-    from predictors.statistics import compare_conditions
-
-    own = rows[rows["predictor"] == predictor]
-    units = own.assign(participant=own["condition"] + "/" + own["layout"].astype(str))
-    units = units.groupby(["condition", "participant", "fraction"], sort=False)[["correct"]].mean().reset_index()
-    each = compare_conditions(units, correct_fractions="holm")
-    return each, compare_conditions(units, at="mean")
-
-
-def compare_people(rows: pd.DataFrame, predictor: str, best: pd.DataFrame) -> tuple[Comparison, Comparison]:
-    """Conditions in the layouts shown, with people as units, as in the paper: one layout per condition."""
-    from predictors.statistics import compare_conditions
-
-    shown = best[["condition", "layout"]].merge(rows[rows["predictor"] == predictor], on=["condition", "layout"])
-    return compare_conditions(shown, correct_fractions="holm"), compare_conditions(shown, at="mean")
-
-
 def metrics_table(results: Results) -> pd.DataFrame:
     """Figures of merit per people, predictor and condition: means over fractions and layouts, and their spread."""
     keys = ["walker", "predictor", "condition"]
@@ -134,14 +125,7 @@ def metrics_table(results: Results) -> pd.DataFrame:
     grouped = per_layout.reset_index().groupby(keys, sort=False)
     table = grouped[names].mean()
     table.insert(1, "accuracy_sd", grouped["accuracy"].std())
-    order = {name: i for i, name in enumerate(CONDITIONS)}
-    table = table.reset_index()
-    walkers, predictors = results.walkers, results.predictors
-    ranks = [
-        (walkers.index(w), predictors.index(p), order[c])
-        for w, p, c in zip(table["walker"], table["predictor"], table["condition"], strict=True)
-    ]
-    return table.iloc[sorted(range(len(ranks)), key=ranks.__getitem__)].reset_index(drop=True)
+    return in_order(table.reset_index(), walker=results.walkers, predictor=results.predictors, condition=CONDITIONS)
 
 
 def beside_published(metrics: pd.DataFrame, predictor: str) -> pd.DataFrame:
@@ -161,23 +145,9 @@ def beside_published(metrics: pd.DataFrame, predictor: str) -> pd.DataFrame:
 
 
 def anova_table(results: Results, best: pd.DataFrame) -> pd.DataFrame:
-    """One-way analyses of variance over the conditions at each fraction and over all (``fraction`` empty).
-
-    Both with layouts as units and, in the layouts shown, with people as units.
-    """
-    import pandas as pd
-
-    parts = []
-    for walker in results.walkers:
-        rows = accuracy_rows(results, walker)
-        for predictor in results.predictors:
-            both = {"layout": compare_layouts(rows, predictor), "participant": compare_people(rows, predictor, best)}
-            for unit, comparisons in both.items():
-                for comparison in comparisons:
-                    parts.append(comparison.anova.assign(walker=walker, predictor=predictor, unit=unit))
-    table = pd.concat(parts, ignore_index=True)
-    front = ["walker", "predictor", "unit", "fraction"]
-    return table[[*front, *(column for column in table if column not in front)]]
+    """Analyses of variance of each kind of people; see :func:`benchmarks.conditions.variance_rows`."""
+    of = {walker: variance_rows(accuracy_rows(results, walker), results.predictors, best) for walker in results.walkers}
+    return stacked(of, "walker")
 
 
 def hypotheses_of(results: Results) -> dict[str, Hypotheses]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from benchmarks.conditions import variance_rows
+from benchmarks.conditions import stacked, variance_rows
 from benchmarks.sections import Section, write_tables
 from benchmarks.tabletop_conditions import figures, tables, words
 
@@ -30,9 +30,11 @@ def sections(folder: str | Path) -> list[Section]:
     results = tables.load_results(folder)
     found = _tables(results)
     hypotheses = tables.hypotheses_of(results)
-    found["verdicts"] = _stacked({name: one.verdicts() for name, one in hypotheses.items()})
-    found["hypotheses"] = _stacked({name: one.tests for name, one in hypotheses.items()}).drop(columns="treatment")
-    found["hypotheses_by_fraction"] = _stacked({name: one.points for name, one in hypotheses.items()})
+    found["verdicts"] = stacked({name: one.verdicts() for name, one in hypotheses.items()}, "design")
+    found["hypotheses"] = stacked({name: one.tests for name, one in hypotheses.items()}, "design").drop(
+        columns="treatment"
+    )
+    found["hypotheses_by_fraction"] = stacked({name: one.points for name, one in hypotheses.items()}, "design")
     write_tables(folder / "tables", found.items())
     drawn = figures.draw_all(results, folder / "figures")
     return [
@@ -140,11 +142,3 @@ def _layout_table(layouts: pd.DataFrame) -> pd.DataFrame:
 def _overall(anova: pd.DataFrame) -> pd.DataFrame:
     own = anova[anova["fraction"].isna()]
     return own[["predictor", "unit", "F", "df1", "df2", "p", "eta_squared"]].reset_index(drop=True)
-
-
-def _stacked(parts: dict[str, pd.DataFrame]) -> pd.DataFrame:
-    """Tables of several designs below one another, named in the first column."""
-    import pandas as pd
-
-    table = pd.concat([part.assign(design=name) for name, part in parts.items()], ignore_index=True)
-    return table[["design", *(column for column in table if column != "design")]]
