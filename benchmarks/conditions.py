@@ -1,4 +1,4 @@
-"""Conditions compared over their layouts and people: tests, and the figures that show them."""
+"""Conditions compared over their layouts and people: tables, tests, and the figures that show them."""
 
 from __future__ import annotations
 
@@ -18,8 +18,10 @@ if TYPE_CHECKING:
 __all__ = [
     "accuracy_by_condition",
     "bars_by_condition",
+    "beside_published",
     "compare_layouts",
     "compare_people",
+    "figures_of_merit",
     "in_order",
     "learning_by_condition",
     "round_up",
@@ -51,6 +53,42 @@ def stacked(parts: Mapping[str, pd.DataFrame], name: str) -> pd.DataFrame:
 
     table = pd.concat([part.assign(**{name: key}) for key, part in parts.items()], ignore_index=True)
     return table[[name, *(column for column in table if column != name)]]
+
+
+# -- tables -----------------------------------------------------------------------------------------------------------
+
+
+def figures_of_merit(rows: pd.DataFrame, orders: Mapping[str, Sequence[str]]) -> pd.DataFrame:
+    """Means over fractions and layouts, and ``accuracy_sd``, the spread of accuracy between layouts.
+
+    Args:
+        rows: ``metrics`` rows, as of :func:`benchmarks.judging.judged_rows`.
+        orders: The columns that there is a row for each combination of, and their values in order.
+    """
+    keys, names = list(orders), ["accuracy", "f1", "precision", "recall", "log_loss", "calibration_error"]
+    grouped = rows.groupby([*keys, "layout"], sort=False)[names].mean().groupby(keys, sort=False)
+    table = grouped.mean()
+    table.insert(1, "accuracy_sd", grouped["accuracy"].std())
+    return in_order(table.reset_index(), **orders)
+
+
+def beside_published(published: Mapping[str, Mapping[str, float]], ours: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """A row per condition of the paper: each of its figures, named ``"f1, paper"``, and ours, ``"f1, NAME"``.
+
+    Args:
+        published: The paper's figures by condition and name.
+        ours: By name, tables with ``condition`` (once each) and the same figures.
+    """
+    import pandas as pd
+
+    rows, own = [], {who: table.set_index("condition") for who, table in ours.items()}
+    for condition, known in published.items():
+        row: dict[str, object] = {"condition": condition}
+        for name, value in known.items():
+            row[f"{name}, paper"] = value
+            row |= {f"{name}, {who}": float(table[name][condition]) for who, table in own.items()}
+        rows.append(row)
+    return pd.DataFrame(rows)
 
 
 # -- tests ------------------------------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""Judging predictors on the people of one layout: the rows that experiments about conditions log.
+"""Judging predictors on the people of one layout: the rows that experiments about conditions log, and read back.
 
 >>> from benchmarks.judging import Judge, judged_rows, make_judge
 >>> judge = make_judge(Judge("Eq. 1", "reach-bayesian").how)                    # doctest: +SKIP
@@ -14,12 +14,23 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     import pandas as pd
 
     from legible_envs.rollouts import Trajectory
     from predictors.base import GoalPredictor
 
-__all__ = ["Judge", "curve_rows", "judged_rows", "labelled", "make_judge"]
+__all__ = [
+    "Judge",
+    "by_table",
+    "confusion_matrix",
+    "curve_rows",
+    "judged_rows",
+    "labelled",
+    "logged_rows",
+    "make_judge",
+]
 
 Rows = list[dict[str, Any]]
 
@@ -162,3 +173,52 @@ def _usable_seeds(walks: Sequence[Trajectory], least: float, test_share: float, 
         f"of {_TRIES} splits only {len(found)} have {least:.0%} of the walks mention every goal; {count} are needed: "
         "begin with a larger share"
     )
+
+
+# -- reading back -----------------------------------------------------------------------------------------------------
+
+
+def logged_rows(folder: Path, name: str, experiment: str) -> pd.DataFrame:
+    """The rows of one result file; none where nothing was logged into it.
+
+    Only empty fields are missing values: people and goals may have names such as "NA".
+
+    Args:
+        folder: Of the experiment.
+        name: Of the file, without ``.csv``.
+        experiment: As ``legible reproduce`` calls it.
+
+    Raises:
+        FileNotFoundError: There is no such file; the message says how to run the experiment.
+    """
+    import pandas as pd
+
+    path = folder / f"{name}.csv"
+    try:
+        return pd.read_csv(path, keep_default_na=False, na_values=[""], low_memory=False)
+    except pd.errors.EmptyDataError:
+        return pd.DataFrame()
+    except FileNotFoundError as error:
+        raise FileNotFoundError(f"{path} is missing; run `legible reproduce {experiment}` first") from error
+
+
+def by_table(rows: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """Rows of several tables, as of :func:`labelled`, taken apart; each without the columns of others."""
+    return {
+        str(name): part.dropna(axis=1, how="all").reset_index(drop=True)
+        for name, part in rows.groupby("table", sort=False)
+    }
+
+
+def confusion_matrix(rows: pd.DataFrame, **only: Any) -> pd.DataFrame:
+    """A square table: true goals as rows, predicted ones as columns.
+
+    Args:
+        rows: ``confusion`` rows.
+        only: Values of columns, for which rows are counted.
+    """
+    for name, value in only.items():
+        rows = rows[rows[name] == value]
+    goals = sorted({*rows["goal"], *rows["predicted"]})
+    wide = rows.pivot_table(index="goal", columns="predicted", values="count", aggfunc="sum", fill_value=0.0)
+    return wide.reindex(index=goals, columns=goals, fill_value=0.0)

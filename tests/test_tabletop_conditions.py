@@ -12,8 +12,17 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks.conditions import bars_by_condition, in_order, slug
-from benchmarks.judging import Judge, curve_rows, judged_rows, make_judge
+from benchmarks.conditions import (
+    accuracy_by_condition,
+    bars_by_condition,
+    beside_published,
+    compare_layouts,
+    figures_of_merit,
+    in_order,
+    slug,
+    stacked,
+)
+from benchmarks.judging import Judge, by_table, confusion_matrix, curve_rows, judged_rows, logged_rows, make_judge
 from benchmarks.sections import Section
 from benchmarks.tabletop_conditions import QUICK, Settings, reproduce, run, sections, sweep, tables, words
 from benchmarks.tabletop_conditions.readers import NoReader
@@ -166,6 +175,33 @@ def test_judged_rows_agree_with_one_another() -> None:
     assert confusion["count"].sum() == pytest.approx(len(reaches))
     hits = confusion[confusion["goal"] == confusion["predicted"]]["count"].sum()
     assert hits / len(reaches) == pytest.approx(means[0])
+    fewer = judged_rows(make_judge(sweep.PREDICTORS[3].how), reaches, folds=3, repeats=2, seed=1, starts=False,
+                        confusion_over="sum")  # fmt: skip
+    others = by_table(pd.DataFrame(fewer))
+    assert set(others) == {"accuracy", "metrics", "confusion"}
+    fractions = parts["accuracy"]["fraction"].nunique()
+    np.testing.assert_allclose(others["confusion"]["count"], fractions * confusion["count"])
+
+
+def test_logged_rows_come_back_with_every_name(tmp_path: Path) -> None:
+    rows = pd.DataFrame(
+        [
+            {"table": "confusion", "goal": "NA", "predicted": "None", "count": 2.0, "layout": 0},
+            {"table": "confusion", "goal": "None", "predicted": "None", "count": 3.0, "layout": 0},
+            {"table": "confusion", "goal": "NA", "predicted": "NA", "count": 9.0, "layout": 1},
+            {"table": "other", "value": 1.0},
+        ]
+    )
+    rows.to_csv(tmp_path / "readings.csv", index=False)
+    (tmp_path / "people.csv").write_text("\n")
+    parts = by_table(logged_rows(tmp_path, "readings", "tabletop"))
+    assert list(parts["other"]) == ["table", "value"]
+    matrix = confusion_matrix(parts["confusion"], layout=0)
+    assert matrix.index.tolist() == matrix.columns.tolist() == ["NA", "None"]
+    assert matrix.to_numpy().tolist() == [[0, 2], [0, 3]]
+    assert logged_rows(tmp_path, "people", "tabletop").empty
+    with pytest.raises(FileNotFoundError, match="legible reproduce kitchens"):
+        logged_rows(tmp_path, "curves", "kitchens")
 
 
 def test_learning_curves_begin_where_every_goal_is_known() -> None:
@@ -293,6 +329,34 @@ def test_an_analysis_without_results_says_what_to_do(tmp_path: Path) -> None:
         sections(tmp_path)
     with pytest.raises(ValueError, match="2 or more per condition"):
         reproduce(tmp_path, quick=True, seeds=1)
+
+
+def test_means_are_of_layouts_and_spread_is_between_them() -> None:
+    names = ("f1", "precision", "recall", "log_loss", "calibration_error")
+    values = {("A", 0): (0.2, 0.4), ("A", 1): (0.7,), ("B", 0): (0.5,), ("B", 1): (0.5,)}
+    rows = pd.DataFrame(
+        [
+            {"condition": condition, "layout": layout, "accuracy": value, **dict.fromkeys(names, 1 - value)}
+            for (condition, layout), each in values.items()
+            for value in each
+        ]
+    )
+    table = figures_of_merit(rows, {"condition": ["B", "A"]})
+    assert table["condition"].tolist() == ["B", "A"]
+    assert table["accuracy"].tolist() == pytest.approx([0.5, 0.5])
+    assert table["accuracy_sd"].tolist() == pytest.approx([0, np.std([0.3, 0.7], ddof=1)])
+    beside = beside_published({"A": {"f1": 0.9, "recall": 0.8}}, {"ours": table})
+    assert beside.to_dict("records") == [
+        {"condition": "A", "f1, paper": 0.9, "f1, ours": 0.5, "recall, paper": 0.8, "recall, ours": 0.5}
+    ]
+    assert stacked({"x": rows, "y": rows}, "who")["who"].tolist() == ["x"] * len(rows) + ["y"] * len(rows)
+
+
+def test_what_is_said_below_a_figure_stands_in_it(results: tables.Results) -> None:
+    each, _ = compare_layouts(tables.accuracy_rows(results), results.predictors[0])
+    plain, noted = (accuracy_by_condition(each, sweep.CONDITIONS, 0.2, "T", "S", note) for note in ("", "Look here."))
+    assert "Look here." in noted
+    assert "Look here." not in plain
 
 
 def test_pieces_of_figures() -> None:

@@ -65,7 +65,9 @@ def reproduce(
     if seeds is not None:
         settings = dataclasses.replace(settings, layouts=seeds)
     if settings.layouts < 2:
-        raise ValueError(f"conditions are compared by layouts: 2 or more per condition are needed, got {seeds}")
+        raise ValueError(
+            f"conditions are compared by layouts: 2 or more per condition are needed, got {settings.layouts}"
+        )
     folder = Path(folder)
 
     def run(function: Callable[[dict[str, Any]], Any], cells: Rows, name: str) -> pd.DataFrame:

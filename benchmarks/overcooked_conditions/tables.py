@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
-from benchmarks.conditions import in_order, stacked, variance_rows
+from benchmarks import conditions
+from benchmarks.conditions import figures_of_merit, stacked, variance_rows
 from benchmarks.hypotheses import Hypotheses, assess_hypotheses
+from benchmarks.judging import by_table, confusion_matrix, logged_rows
 from benchmarks.overcooked_conditions.sweep import CONDITIONS, PUBLISHED
 
 if TYPE_CHECKING:
     import pandas as pd
 
 __all__ = [
-    "METRICS",
     "Results",
     "accuracy_rows",
     "anova_table",
@@ -25,8 +26,6 @@ __all__ = [
     "load_results",
     "metrics_table",
 ]
-
-METRICS: Final = ("f1", "precision", "recall")
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,26 +63,9 @@ def load_results(folder: Path) -> Results:
     Raises:
         FileNotFoundError: There is nothing; the message says how to run the experiment.
     """
-    import pandas as pd
-
-    def read(name: str) -> pd.DataFrame:
-        path = folder / f"{name}.csv"
-        try:
-            return pd.read_csv(path, keep_default_na=False, na_values=[""], low_memory=False)
-        except pd.errors.EmptyDataError:
-            return pd.DataFrame()
-        except FileNotFoundError as error:
-            raise FileNotFoundError(f"{path} is missing; run `legible reproduce overcooked` first") from error
-
-    found, readings = read("layouts"), read("readings")
-    parts = {
-        str(name): part.dropna(axis=1, how="all").reset_index(drop=True)
-        for name, part in readings.groupby("table", sort=False)
-    }
-    layouts, elites = (
-        found[found["table"] == name].dropna(axis=1, how="all").reset_index(drop=True) for name in ("layout", "elite")
-    )
-    return Results(layouts, elites, read("people"), parts, read("curves"))
+    found = by_table(logged_rows(folder, "layouts", "overcooked"))
+    readings, fits, curves = (logged_rows(folder, name, "overcooked") for name in ("readings", "people", "curves"))
+    return Results(found["layout"], found["elite"], fits, by_table(readings), curves)
 
 
 def best_layouts(results: Results) -> pd.DataFrame:
@@ -119,29 +101,14 @@ def accuracy_rows(results: Results, walker: str) -> pd.DataFrame:
 
 def metrics_table(results: Results) -> pd.DataFrame:
     """Figures of merit per people, predictor and condition: means over fractions and layouts, and their spread."""
-    keys = ["walker", "predictor", "condition"]
-    names = ["accuracy", *METRICS, "log_loss", "calibration_error"]
-    per_layout = results.readings["metrics"].groupby([*keys, "layout"], sort=False)[names].mean()
-    grouped = per_layout.reset_index().groupby(keys, sort=False)
-    table = grouped[names].mean()
-    table.insert(1, "accuracy_sd", grouped["accuracy"].std())
-    return in_order(table.reset_index(), walker=results.walkers, predictor=results.predictors, condition=CONDITIONS)
+    orders = {"walker": results.walkers, "predictor": results.predictors, "condition": CONDITIONS}
+    return figures_of_merit(results.readings["metrics"], orders)
 
 
 def beside_published(metrics: pd.DataFrame, predictor: str) -> pd.DataFrame:
     """F1, precision and recall of the paper and ours, a row per condition."""
-    import pandas as pd
-
-    rows = []
-    for condition in CONDITIONS:
-        row: dict[str, object] = {"condition": condition}
-        for name in METRICS:
-            row[f"{name}, paper"] = PUBLISHED[condition][name]
-            for walker in dict.fromkeys(metrics["walker"]):
-                own = metrics[(metrics["walker"] == walker) & (metrics["predictor"] == predictor)]
-                row[f"{name}, {walker}"] = float(own.set_index("condition")[name][condition])
-        rows.append(row)
-    return pd.DataFrame(rows)
+    own = metrics[metrics["predictor"] == predictor]
+    return conditions.beside_published(PUBLISHED, {str(who): rows for who, rows in own.groupby("walker", sort=False)})
 
 
 def anova_table(results: Results, best: pd.DataFrame) -> pd.DataFrame:
@@ -167,11 +134,5 @@ def hypotheses_of(results: Results) -> dict[str, Hypotheses]:
 
 def confusion_of(results: Results, walker: str, predictor: str, condition: str, layout: int) -> pd.DataFrame:
     """A square table of walks: true goals as rows, predicted ones as columns."""
-    rows = results.readings["confusion"]
     keys = {"walker": walker, "predictor": predictor, "condition": condition, "layout": layout}
-    for name, value in keys.items():
-        rows = rows[rows[name] == value]
-    goals = sorted({*rows["goal"], *rows["predicted"]})
-    fractions = results.readings["accuracy"]["fraction"].nunique()
-    wide = rows.pivot_table(index="goal", columns="predicted", values="count", aggfunc="sum", fill_value=0.0)
-    return wide.reindex(index=goals, columns=goals, fill_value=0.0) / fractions
+    return confusion_matrix(results.readings["confusion"], **keys) / results.readings["accuracy"]["fraction"].nunique()

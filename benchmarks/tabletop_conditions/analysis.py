@@ -31,9 +31,8 @@ def sections(folder: str | Path) -> list[Section]:
     found = _tables(results)
     hypotheses = tables.hypotheses_of(results)
     found["verdicts"] = stacked({name: one.verdicts() for name, one in hypotheses.items()}, "design")
-    found["hypotheses"] = stacked({name: one.tests for name, one in hypotheses.items()}, "design").drop(
-        columns="treatment"
-    )
+    tests = {name: one.tests.drop(columns="treatment") for name, one in hypotheses.items()}
+    found["hypotheses"] = stacked(tests, "design")
     found["hypotheses_by_fraction"] = stacked({name: one.points for name, one in hypotheses.items()}, "design")
     write_tables(folder / "tables", found.items())
     drawn = figures.draw_all(results, folder / "figures")

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from benchmarks.conditions import in_order
+from benchmarks import conditions
+from benchmarks.conditions import figures_of_merit, in_order
 from benchmarks.hypotheses import Hypotheses, assess_hypotheses
+from benchmarks.judging import by_table, confusion_matrix, logged_rows
 from benchmarks.tabletop_conditions.sweep import CONDITIONS, HAVE_OBSTACLES, PUBLISHED, PUBLISHED_SPREAD
 
 if TYPE_CHECKING:
@@ -17,7 +19,6 @@ if TYPE_CHECKING:
 
 __all__ = [
     "MEASURES",
-    "METRICS",
     "Results",
     "accuracy_rows",
     "beside_published",
@@ -34,7 +35,6 @@ __all__ = [
     "team_table",
 ]
 
-METRICS: Final = ("f1", "precision", "recall")
 MEASURES: Final = (
     "completion_time",
     "conflicts",
@@ -89,20 +89,9 @@ def load_results(folder: Path) -> Results:
     Raises:
         FileNotFoundError: There is nothing; the message says how to run the experiment.
     """
-    import pandas as pd
-
-    def read(name: str) -> pd.DataFrame:
-        path = folder / f"{name}.csv"
-        try:
-            return pd.read_csv(path, low_memory=False)
-        except FileNotFoundError as error:
-            raise FileNotFoundError(f"{path} is missing; run `legible reproduce tabletop` first") from error
-
-    parts = {
-        str(name): part.dropna(axis=1, how="all").reset_index(drop=True)
-        for name, part in read("readings").groupby("table", sort=False)
-    }
-    return Results(read("layouts"), parts, read("curves"), read("spreads"), read("teams"))
+    names = ("layouts", "readings", "curves", "spreads", "teams")
+    layouts, readings, curves, spreads, teams = (logged_rows(folder, name, "tabletop") for name in names)
+    return Results(layouts, by_table(readings), curves, spreads, teams)
 
 
 def best_layouts(results: Results) -> pd.DataFrame:
@@ -131,13 +120,7 @@ def accuracy_rows(results: Results) -> pd.DataFrame:
 
 def metrics_table(results: Results) -> pd.DataFrame:
     """Figures of merit per predictor and condition: means over fractions and layouts, and the spread of layouts."""
-    keys = ["predictor", "condition"]
-    names = ["accuracy", *METRICS, "log_loss", "calibration_error"]
-    per_layout = results.complying("metrics").groupby([*keys, "layout"], sort=False)[names].mean()
-    grouped = per_layout.groupby(keys, sort=False)
-    table = grouped.mean()
-    table.insert(1, "accuracy_sd", grouped["accuracy"].std())
-    return in_order(table.reset_index(), predictor=results.predictors, condition=CONDITIONS)
+    return figures_of_merit(results.complying("metrics"), {"predictor": results.predictors, "condition": CONDITIONS})
 
 
 def start_table(results: Results) -> pd.DataFrame:
@@ -150,18 +133,8 @@ def start_table(results: Results) -> pd.DataFrame:
 
 def beside_published(metrics: pd.DataFrame, predictors: list[str]) -> pd.DataFrame:
     """F1, precision and recall of the paper and of two of our predictors, a row per condition of the paper."""
-    import pandas as pd
-
-    rows = []
-    for condition, known in PUBLISHED.items():
-        row: dict[str, object] = {"condition": condition}
-        for name in METRICS:
-            row[f"{name}, paper"] = known[name]
-            for predictor in predictors:
-                own = metrics[metrics["predictor"] == predictor].set_index("condition")[name]
-                row[f"{name}, {predictor}"] = float(own[condition])
-        rows.append(row)
-    return pd.DataFrame(rows)
+    ours = {predictor: metrics[metrics["predictor"] == predictor] for predictor in predictors}
+    return conditions.beside_published(PUBLISHED, ours)
 
 
 def compliance_table(results: Results) -> pd.DataFrame:
@@ -199,12 +172,8 @@ def hypotheses_of(results: Results) -> dict[str, Hypotheses]:
 
 def confusion_of(results: Results, predictor: str, condition: str, layout: int) -> pd.DataFrame:
     """A square table of reaches: true goals as rows, predicted ones as columns."""
-    rows = results.complying("confusion")
-    for name, value in {"predictor": predictor, "condition": condition, "layout": layout}.items():
-        rows = rows[rows[name] == value]
-    goals = sorted({*rows["goal"], *rows["predicted"]})
-    wide = rows.pivot_table(index="goal", columns="predicted", values="count", aggfunc="sum", fill_value=0.0)
-    return wide.reindex(index=goals, columns=goals, fill_value=0.0)
+    keys = {"predictor": predictor, "condition": condition, "layout": layout}
+    return confusion_matrix(results.complying("confusion"), **keys)
 
 
 # -- how much reaches differ ------------------------------------------------------------------------------------------
@@ -241,18 +210,9 @@ def _apart(part: pd.DataFrame) -> float:
 
 def spread_beside_published(spread: pd.DataFrame) -> pd.DataFrame:
     """Determinant and trace of the paper and ours, a row per condition of the paper."""
-    import pandas as pd
-
     names = {"none": "ours", "mean": "ours, warped"}
-    own = {name: spread[spread["alignment"] == key].set_index("condition") for key, name in names.items()}
-    rows = []
-    for condition, known in PUBLISHED_SPREAD.items():
-        row: dict[str, object] = {"condition": condition}
-        for size in ("determinant", "trace"):
-            row[f"{size}, paper"] = known[size]
-            row |= {f"{size}, {name}": float(table[size][condition]) for name, table in own.items()}
-        rows.append(row)
-    return pd.DataFrame(rows)
+    ours = {name: spread[spread["alignment"] == key] for key, name in names.items()}
+    return conditions.beside_published(PUBLISHED_SPREAD, ours)
 
 
 # -- people at work ---------------------------------------------------------------------------------------------------
