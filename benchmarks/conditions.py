@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +17,9 @@ if TYPE_CHECKING:
     from predictors.statistics import Comparison
 
 __all__ = [
+    "Agreement",
     "accuracy_by_condition",
+    "agreements",
     "bars_by_condition",
     "beside_published",
     "compare_layouts",
@@ -89,6 +92,71 @@ def beside_published(published: Mapping[str, Mapping[str, float]], ours: Mapping
             row |= {f"{name}, {who}": float(table[name][condition]) for who, table in own.items()}
         rows.append(row)
     return pd.DataFrame(rows)
+
+
+@dataclasses.dataclass(frozen=True)
+class Agreement:
+    """How figures of ours agree with the paper's.
+
+    Attributes:
+        ranked: Conditions by our figures, the best first.
+        swapped: How many pairs of conditions are in another order than in the paper.
+        gain: What a treatment adds to a control.
+        published_gain: The same in the paper.
+        level: Ours less the paper's, mean over conditions.
+        least: The same, least of all conditions.
+        most: The same, most of all conditions.
+    """
+
+    ranked: list[str]
+    swapped: int
+    gain: float
+    published_gain: float
+    level: float
+    least: float
+    most: float
+
+    @property
+    def gain_said(self) -> str:
+        """How our gain compares with the paper's, in words."""
+        if abs(self.gain - self.published_gain) < 0.05:
+            return "about as much as"
+        return "less than" if self.gain < self.published_gain else "more than"
+
+    @property
+    def level_said(self) -> str:
+        """How our figures compare with the paper's, in words."""
+        which = "higher" if self.level > 0 else "lower"
+        return f"{which} by {abs(self.level):.3f} on average ({self.least:+.3f} to {self.most:+.3f})"
+
+
+def agreements(published: pd.DataFrame, treatment: str, control: str) -> dict[str, Agreement]:
+    """How our F1 agrees with the paper's.
+
+    Args:
+        published: As of :func:`beside_published`.
+        treatment: The condition whose gain is compared.
+        control: Over which other.
+
+    Returns:
+        By the name that ours have in the table.
+    """
+    table = published.set_index("condition")
+    columns = {str(c).removeprefix("f1, "): table[c] for c in table if str(c).startswith("f1, ")}
+    paper = columns.pop("paper")
+    order, found = sorted(paper.index, key=lambda name: -paper[name]), {}
+    for who, ours in columns.items():
+        apart = ours - paper
+        found[who] = Agreement(
+            ranked=sorted(ours.index, key=lambda name: -ours[name]),
+            swapped=sum(bool(ours[a] < ours[b]) for a, b in itertools.combinations(order, 2)),
+            gain=float(ours[treatment] - ours[control]),
+            published_gain=float(paper[treatment] - paper[control]),
+            level=float(apart.mean()),
+            least=float(apart.min()),
+            most=float(apart.max()),
+        )
+    return found
 
 
 # -- tests ------------------------------------------------------------------------------------------------------------

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from benchmarks.conditions import stacked
+from benchmarks.conditions import agreements, stacked
 from benchmarks.overcooked_conditions import figures, tables
-from benchmarks.overcooked_conditions.sweep import CONDITIONS, FITTED, FITTED_SOURCE, PREFERENCE, PUBLISHED
+from benchmarks.overcooked_conditions.sweep import FITTED, FITTED_SOURCE, PREFERENCE
 from benchmarks.sections import Section, write_tables
 
 if TYPE_CHECKING:
@@ -194,27 +194,16 @@ def agreement(published: pd.DataFrame) -> str:
         published: As of :func:`benchmarks.overcooked_conditions.tables.beside_published`.
     """
     lines = []
-    paper = published.set_index("condition")["f1, paper"]
-    order = sorted(CONDITIONS, key=lambda name: -PUBLISHED[name]["f1"])
-    for column in [str(c) for c in published if str(c).startswith("f1, ") and c != "f1, paper"]:
-        ours = published.set_index("condition")[column]
-        ranked = sorted(CONDITIONS, key=lambda name: -ours[name])
-        swapped = sum(ours[a] < ours[b] for i, a in enumerate(order) for b in order[i + 1 :])
+    for walker, it in agreements(published, "Legible", "Random").items():
         same = (
-            "the same order of conditions as"
-            if ranked == order
-            else f"{swapped} of 6 pairs of conditions in another order than"
+            f"{it.swapped} of 6 pairs of conditions in another order than"
+            if it.swapped
+            else "the same order of conditions as"
         )
-        gain, theirs = ours["Legible"] - ours["Random"], paper["Legible"] - paper["Random"]
-        size = "about as much as" if abs(gain - theirs) < 0.05 else "less than" if gain < theirs else "more than"
         lines.append(
-            f"{column.removeprefix('f1, ').capitalize()} people: {same} in the paper ({', '.join(ranked)}, the best "
-            f"read first). Legible layouts raise F1 by {gain:+.3f} over random ones, {size} the paper's {theirs:+.3f}."
-        )
-        level = float((ours - paper).mean())
-        lines[-1] += (
-            f" Over all conditions our F1 is {'higher' if level > 0 else 'lower'} by {abs(level):.3f} on average"
-            f" ({min(ours - paper):+.3f} to {max(ours - paper):+.3f})."
+            f"{walker.capitalize()} people: {same} in the paper ({', '.join(it.ranked)}, the best read first). Legible "
+            f"layouts raise F1 by {it.gain:+.3f} over random ones, {it.gain_said} the paper's "
+            f"{it.published_gain:+.3f}. Over all conditions our F1 is {it.level_said}."
         )
     lines.append(
         "Why values may differ: the paper's are of human participants, who learn, hesitate and change their minds; "

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from benchmarks.conditions import agreements
 from benchmarks.tabletop_conditions.sweep import CONDITIONS, HAVE_OBSTACLES, PUBLISHED, PUBLISHED_SPREAD
 
 if TYPE_CHECKING:
@@ -117,21 +118,13 @@ def agreement(published: pd.DataFrame, metrics: pd.DataFrame, predictors: list[s
         metrics: As of :func:`benchmarks.tabletop_conditions.tables.metrics_table`.
         predictors: In order, the paper's first.
     """
-    table, order = published.set_index("condition"), sorted(PUBLISHED, key=lambda name: -PUBLISHED[name]["f1"])
-    paper, lines = table["f1, paper"], []
-    for column in [str(c) for c in table if str(c).startswith("f1, ") and c != "f1, paper"]:
-        ours = table[column]
-        ranked = sorted(PUBLISHED, key=lambda name: -ours[name])
-        swapped = sum(ours[a] < ours[b] for i, a in enumerate(order) for b in order[i + 1 :])
-        same = "in the paper's order" if not swapped else f"{swapped} of 6 pairs in another order than the paper's"
-        gain, theirs = ours["Both"] - ours["Baseline"], paper["Both"] - paper["Baseline"]
-        size = "about as much as" if abs(gain - theirs) < 0.05 else "less than" if gain < theirs else "more than"
-        level = float((ours - paper).mean())
+    order, lines = sorted(PUBLISHED, key=lambda name: -PUBLISHED[name]["f1"]), []
+    for who, it in agreements(published, "Both", "Baseline").items():
+        same = f"{it.swapped} of 6 pairs in another order than the paper's" if it.swapped else "in the paper's order"
         lines.append(
-            f"{column.removeprefix('f1, ')}: conditions {same} ({', '.join(ranked)}, the best read first). Both "
-            f"changes F1 by {gain:+.3f} from the Baseline, {size} the paper's {theirs:+.3f}; over all conditions our "
-            f"F1 is {'higher' if level > 0 else 'lower'} by {abs(level):.3f} on average ({min(ours - paper):+.3f} to "
-            f"{max(ours - paper):+.3f})."
+            f"{who}: conditions {same} ({', '.join(it.ranked)}, the best read first). Both changes F1 by "
+            f"{it.gain:+.3f} from the Baseline, {it.gain_said} the paper's {it.published_gain:+.3f}; over all "
+            f"conditions our F1 is {it.level_said}."
         )
     wide = metrics.pivot_table(index="predictor", columns="condition", values="f1", sort=False)[list(PUBLISHED)]
     same_order = [name for name in predictors if sorted(order, key=lambda c: -wide[c][name]) == order]
