@@ -62,7 +62,7 @@ def _content(section: Section) -> dict[str, Any]:
         "title": section.title,
         "paragraphs": [part.strip() for part in section.text.split("\n\n") if part.strip()],
         "tables": [_table(caption, table) for caption, table in section.tables.items()],
-        "figures": [(path.stem.replace("_", " "), _data_url(path)) for path in section.figures],
+        "figures": [(path.stem.replace("_", " "), _data_url(path), _is_wide(path)) for path in section.figures],
     }
 
 
@@ -89,6 +89,16 @@ def _text(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:,.4g}" if abs(value) < 1e4 else f"{value:,.0f}"
     return str(value)
+
+
+def _is_wide(path: Path) -> bool:
+    """Whether a picture is a strip that wants the whole width of the page."""
+    if path.suffix != ".png":
+        return False
+    from PIL import Image
+
+    with Image.open(path) as image:
+        return image.width > 1.9 * image.height
 
 
 def _data_url(path: Path) -> str:

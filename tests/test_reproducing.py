@@ -11,6 +11,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 from click.testing import CliRunner
+from PIL import Image
 
 from benchmarks import reproducing
 from benchmarks.cells import run_cells
@@ -99,6 +100,10 @@ def test_the_page_holds_its_pictures_and_asks_for_nothing(tmp_path: Path) -> Non
     assert "0.1235" in page
     assert re.findall(r"<td[^>]*>(yes|no)</td>", page) == ["yes", "no"]
     assert not re.search(r"(?:src|href)=\"(?!data:|#)", page)
+    for size, is_wide in (((400, 100), True), ((100, 100), False)):
+        Image.new("RGB", size).save(tmp_path / "board.png")
+        page = write_experiment_report(tmp_path, [Section("A", figures=[tmp_path / "board.png"])], title="T", lede="L")
+        assert ('<figure class="wide">' in page.read_text()) == is_wide
     picture.rename(tmp_path / "a.gif")
     with pytest.raises(ValueError, match=r"must be one of.*\.png"):
         write_experiment_report(tmp_path, [Section("A", figures=[tmp_path / "a.gif"])], title="T", lede="L")
