@@ -8,6 +8,8 @@ import numpy as np
 import numpy.typing as npt
 from ribs.emitters import EmitterBase
 
+from optimizers.emitters.mutation import draw_elites
+
 if TYPE_CHECKING:
     from ribs.archives import ArchiveBase
 
@@ -152,21 +154,13 @@ class ImproveWorkspaceEmitter(EmitterBase):
         self.finished += len(over)
 
     def _begin_climbs(self) -> None:
-        """Give every idle climb a random elite, as far as ``iterations`` allows.
-
-        Elites are drawn uniformly over occupied cells in order of cell index, not of arrival in the archive: the draw
-        then depends on what the archive holds alone.
-        """
+        """Give every idle climb a random elite, as far as ``iterations`` allows."""
         idle = np.flatnonzero(~self._climbing)
         if self._limit is not None:
             idle = idle[: self._limit - self.started]
         if not idle.size:
             return
-        elites = self.archive.data(["index", "solution", "objective"])
-        order = np.argsort(elites["index"])
-        drawn = order[self._rng.integers(len(order), size=len(idle))]
-        self._genomes[idle] = elites["solution"][drawn]
-        self._scores[idle] = elites["objective"][drawn]
+        self._genomes[idle], self._scores[idle] = draw_elites(self.archive, len(idle), self._rng)
         self._phase[idle] = 0
         self._climbing[idle] = True
         self.started += len(idle)
