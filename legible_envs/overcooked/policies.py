@@ -135,6 +135,23 @@ class ScriptedPlayer:
         """``(row, col)`` of the goal walked to in a game, None between goals."""
         return None if self._goals[index] < 0 else divmod(self._goals[index], self._width)
 
+    def _has_goal(self, index: int, valid_goals: npt.NDArray[np.bool_], layout_id: str) -> bool:
+        """Whether there is something to walk to; where the last goal is no longer valid, another is drawn."""
+        marked = valid_goals.ravel()
+        if layout_id == self._layout_ids[index] and self._goals[index] >= 0 and marked[self._goals[index]]:
+            return True
+        choices = np.flatnonzero(marked)
+        if not len(choices):
+            return False
+        self._layout_ids[index] = layout_id
+        self._goals[index] = int(self.rng.choice(choices))
+        self._forget_way(index)
+        return True
+
+    def _forget_way(self, index: int) -> None:
+        """The goal of a game is a new one."""
+        self._distances[index] = None
+
     def _act(
         self,
         index: int,
@@ -145,14 +162,8 @@ class ScriptedPlayer:
     ) -> int:
         state, kitchen, rules = arrays
         self._width = int(rules[WIDTH])
-        marked = valid_goals.ravel()
-        if layout_id != self._layout_ids[index] or self._goals[index] < 0 or not marked[self._goals[index]]:
-            choices = np.flatnonzero(marked)
-            if not len(choices):
-                return STAY
-            self._layout_ids[index] = layout_id
-            self._goals[index] = int(self.rng.choice(choices))
-            self._distances[index] = None
+        if not self._has_goal(index, valid_goals, layout_id):
+            return STAY
         distances = self._distances[index]
         if distances is None or distances[state[AT_PLAYERS]] < 0:
             distances = self._distances[index] = self._find_way(self._goals[index], state, kitchen, rules)

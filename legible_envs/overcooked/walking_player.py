@@ -48,6 +48,9 @@ class WalkingPlayer(ScriptedPlayer):
         self.walker = walker
         self._walks: list[_Walk | None] = [None] * len(self._goals)
 
+    def _forget_way(self, index: int) -> None:
+        self._walks[index] = None
+
     def _act(
         self,
         index: int,
@@ -58,14 +61,8 @@ class WalkingPlayer(ScriptedPlayer):
     ) -> int:
         state, kitchen, rules = arrays
         self._width = int(rules[WIDTH])
-        marked = valid_goals.ravel()
-        if layout_id != self._layout_ids[index] or self._goals[index] < 0 or not marked[self._goals[index]]:
-            choices = np.flatnonzero(marked)
-            if not len(choices):
-                return STAY
-            self._layout_ids[index] = layout_id
-            self._goals[index] = int(self.rng.choice(choices))
-            self._walks[index] = None
+        if not self._has_goal(index, valid_goals, layout_id):
+            return STAY
         cell, facing = int(state[AT_PLAYERS]), int(state[AT_PLAYERS + 1])
         walk = self._walks[index]
         if walk is None or not walk.leads_from(cell):
