@@ -15,7 +15,7 @@ __all__ = ["anytime_figure"]
 
 _SOFT, _RULE = "#5d6670", "#e3e6ea"
 _DASHES = ("", "7 4", "2 3", "9 3 2 3")
-_LEFT, _TOP, _BOTTOM, _LEGEND = 70.0, 66.0, 84.0, 190.0
+_LEFT, _TOP, _BOTTOM, _LEGEND = 70.0, 66.0, 84.0, 225.0
 
 
 def anytime_figure(curves: pd.DataFrame, *, title: str, width: float = 760, height: float = 420) -> str:

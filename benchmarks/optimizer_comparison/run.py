@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 from collections.abc import Callable
 from functools import cache
@@ -38,7 +37,7 @@ def reproduce(
         folder: Folder of the experiment. ``searches.csv`` holds the logged rows, ``tables`` and ``figures`` what
             :mod:`benchmarks.optimizer_comparison.analysis` makes of them.
         quick: Small grids, few seeds and small budgets.
-        seeds: Searches of each kind; None for those of the settings.
+        seeds: Searches of each kind, of large budgets at most as many as planned; None for those of the settings.
         workers: See :func:`benchmarks.cells.run_cells`.
         scheduler: See there.
         progress: See there.
@@ -53,7 +52,7 @@ def reproduce(
     """
     settings = settings or (QUICK if quick else FULL)
     if seeds is not None:
-        settings = dataclasses.replace(settings, seeds=seeds)
+        settings = settings.with_seeds(seeds)
     if settings.seeds < 2:
         raise ValueError(f"methods are compared by their searches: 2 seeds or more are needed, got {settings.seeds}")
     folder = Path(folder)

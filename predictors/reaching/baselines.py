@@ -109,6 +109,7 @@ class ReachLogistic(_MomentClassifier):
     Args:
         C: Inverse strength of the L2 penalty on standardised features.
         degree: 1: the features. 2: also their squares and products: better, and ten times slower to fit.
+        max_iter: Most iterations; scikit-learn warns where they were not enough.
 
     Attributes:
         classes_: ``(C,)`` names of all goals and candidates seen in ``fit``, sorted.
@@ -116,17 +117,20 @@ class ReachLogistic(_MomentClassifier):
         prior_: ``(G,)`` how often.
     """
 
-    def __init__(self, C: float = 1.0, degree: int = 1) -> None:
+    def __init__(self, C: float = 1.0, degree: int = 1, max_iter: int = 1000) -> None:
         self.C = C
         self.degree = degree
+        self.max_iter = max_iter
 
     def _make(self, moments: int) -> Any:
         if self.degree not in (1, 2):
             raise ValueError(f"`degree` must be 1 or 2, got {self.degree!r}")
         if not 0 < self.C < np.inf:
             raise ValueError(f"`C` must be a finite number > 0, got {self.C!r}")
+        if isinstance(self.max_iter, bool) or not isinstance(self.max_iter, int) or self.max_iter < 1:
+            raise ValueError(f"`max_iter` must be an integer >= 1, got {self.max_iter!r}")
         expand = PolynomialFeatures(self.degree, include_bias=False)
-        return make_pipeline(StandardScaler(), expand, LogisticRegression(C=self.C, max_iter=300))
+        return make_pipeline(StandardScaler(), expand, LogisticRegression(C=self.C, max_iter=self.max_iter))
 
 
 class ReachNeighbours(_MomentClassifier):
