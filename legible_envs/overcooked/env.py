@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium import spaces
 
+from legible_envs.drawing.rendered import Rendered
 from legible_envs.overcooked import batch
 from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.overcooked.observations import grid_observation, vector_observation
@@ -25,7 +26,7 @@ __all__ = ["OvercookedEnv"]
 NUM_ACTIONS = 6
 
 
-class OvercookedEnv(JsonSpec, gym.Env[npt.NDArray[Any], Any]):
+class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
     """A person cooks soups in a kitchen whose layout can be changed from episode to episode.
 
     ## Description
@@ -153,6 +154,7 @@ class OvercookedEnv(JsonSpec, gym.Env[npt.NDArray[Any], Any]):
     """  # noqa: E501
 
     metadata = {"render_modes": ["human", "rgb_array", "ansi"], "render_fps": 8}  # noqa: RUF012
+    _window_title = "Legible kitchen"
 
     def __init__(
         self,
@@ -168,10 +170,7 @@ class OvercookedEnv(JsonSpec, gym.Env[npt.NDArray[Any], Any]):
         shaping: bool | Mapping[str, float] = False,
         render_mode: str | None = None,
     ) -> None:
-        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
-            raise ValueError(
-                f"`render_mode` must be None or one of {self.metadata['render_modes']}, got {render_mode!r}"
-            )
+        self._set_render_mode(render_mode)
         self.settings = KitchenSettings(
             shape=shape,
             layout=layout,
@@ -183,14 +182,12 @@ class OvercookedEnv(JsonSpec, gym.Env[npt.NDArray[Any], Any]):
             obstacle_cost=obstacle_cost,
             shaping=shaping,
         )
-        self.render_mode = render_mode
         self.action_space = spaces.Discrete(NUM_ACTIONS)
         self.observation_space = self.settings.observation_space()
         self._chosen: OvercookedLayout | None = None
         self._pending: PackedKitchen | None = None
         self._actions = np.zeros(1, dtype=np.int64)
         self._goals = np.zeros(self.settings.shape[0] * self.settings.shape[1], dtype=np.bool_)
-        self._window: Any = None
         self._observation_shape = self.observation_space.shape
         self._install(self.settings.pack(self.settings.preview()))
 
@@ -255,37 +252,13 @@ class OvercookedEnv(JsonSpec, gym.Env[npt.NDArray[Any], Any]):
             self.render()
         return self._observe(), reward, over, False, self._info(mask)
 
-    def render(self) -> Any:
-        """Show the game: a picture ``(H', W', 3)`` uint8, a drawing in text, or a window (None).
-
-        The picture is made by :func:`~legible_envs.overcooked.rendering.draw_game`.
-        """
-        if self.render_mode is None:
-            name = self.spec.id if self.spec is not None else type(self).__name__
-            gym.logger.warn(
-                "You are calling render method without specifying any render mode. You can specify the render_mode at "
-                f'initialization, e.g. gym.make("{name}", render_mode="rgb_array")'
-            )
-            return None
-        if self.render_mode == "ansi":
-            return to_text(self.view())
+    def _picture(self) -> npt.NDArray[np.uint8]:
         from legible_envs.overcooked.rendering import draw_game
 
-        picture = draw_game(self.view())
-        if self.render_mode == "rgb_array":
-            return picture
-        if self._window is None:
-            from legible_envs.drawing.window import Window
+        return draw_game(self.view())
 
-            self._window = Window("Legible kitchen", fps=self.metadata["render_fps"])
-        self._window.show(picture)
-        return None
-
-    def close(self) -> None:
-        """Close the window, if there is one."""
-        if self._window is not None:
-            self._window.close()
-            self._window = None
+    def _text(self) -> str:
+        return to_text(self.view())
 
     # -- kitchens -----------------------------------------------------------------------------------------------------
 

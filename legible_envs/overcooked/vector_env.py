@@ -13,6 +13,7 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from legible_envs.drawing.rendered import Windowed
 from legible_envs.overcooked import batch
 from legible_envs.overcooked.batch_game import GameOfBatch
 from legible_envs.overcooked.env import NUM_ACTIONS, OvercookedEnv
@@ -28,7 +29,7 @@ __all__ = ["OvercookedVectorEnv"]
 Infos = dict[str, Any]
 
 
-class OvercookedVectorEnv(JsonSpec, VectorEnv[npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any]]):
+class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any]]):
     """``num_envs`` games of :class:`~legible_envs.overcooked.env.OvercookedEnv`, advanced by one compiled call.
 
     Made by ``gymnasium.make_vec("LegibleOvercooked-v0", num_envs=N, vectorization_mode="vector_entry_point")``.
@@ -49,6 +50,8 @@ class OvercookedVectorEnv(JsonSpec, VectorEnv[npt.NDArray[Any], npt.NDArray[Any]
         ValueError: Likewise, and numbers out of range.
     """
 
+    _window_title = "Legible kitchens"
+
     def __init__(
         self,
         num_envs: int = 1,
@@ -59,9 +62,9 @@ class OvercookedVectorEnv(JsonSpec, VectorEnv[npt.NDArray[Any], npt.NDArray[Any]
         **kwargs: Any,
     ) -> None:
         super().__init__()
-        modes = OvercookedEnv.metadata["render_modes"]
-        if render_mode is not None and render_mode not in modes:
-            raise ValueError(f"`render_mode` must be None or one of {modes}, got {render_mode!r}")
+        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.metadata = {**OvercookedEnv.metadata, "autoreset_mode": self.autoreset_mode}
+        self._set_render_mode(render_mode)
         if num_envs < 1:
             raise ValueError(f"`num_envs` must be at least 1, got {num_envs}")
         if max_episode_steps is not None and max_episode_steps < 1 and max_episode_steps != -1:
@@ -70,9 +73,6 @@ class OvercookedVectorEnv(JsonSpec, VectorEnv[npt.NDArray[Any], npt.NDArray[Any]
             )
         self.settings = KitchenSettings(**kwargs)
         self.num_envs = int(num_envs)
-        self.autoreset_mode = AutoresetMode(autoreset_mode)
-        self.metadata = {**OvercookedEnv.metadata, "autoreset_mode": self.autoreset_mode}
-        self.render_mode = render_mode
         self.max_episode_steps = None if max_episode_steps in (None, -1) else max_episode_steps
         self.single_action_space = spaces.Discrete(NUM_ACTIONS)
         self.single_observation_space = self.settings.observation_space()
@@ -80,7 +80,6 @@ class OvercookedVectorEnv(JsonSpec, VectorEnv[npt.NDArray[Any], npt.NDArray[Any]
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self._rngs: list[np.random.Generator | None] = [None] * self.num_envs
         self._seeds = [-1] * self.num_envs
-        self._window: Any = None
         self._done = np.zeros(self.num_envs, dtype=np.bool_)
         self._ended = 0
         self._begun = False
@@ -196,18 +195,12 @@ class OvercookedVectorEnv(JsonSpec, VectorEnv[npt.NDArray[Any], npt.NDArray[Any]
         if self.render_mode == "rgb_array":
             return tuple(draw_game(view) for view in views)
         if self.render_mode == "human":
-            from legible_envs.drawing.window import Window
-
-            if self._window is None:
-                self._window = Window("Legible kitchens", fps=self.metadata["render_fps"])
-            self._window.show(tile_pictures(views))
+            self._show(tile_pictures(views))
         return None
 
     def close_extras(self, **kwargs: Any) -> None:
         """Close the window, if there is one."""
-        if self._window is not None:
-            self._window.close()
-            self._window = None
+        self._close_window()
 
     # -- each game ----------------------------------------------------------------------------------------------------
 

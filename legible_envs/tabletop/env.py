@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium import spaces
 
+from legible_envs.drawing.rendered import Rendered
 from legible_envs.errors import LayoutError
 from legible_envs.rollouts import Trajectory
 from legible_envs.specs import JsonSpec, check_options
@@ -28,7 +29,7 @@ __all__ = ["TabletopEnv"]
 Floats = npt.NDArray[np.float64]
 
 
-class TabletopEnv(JsonSpec, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
+class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     """A person builds something from objects on a table, alone or beside a robot that reads their reaches.
 
     ## Description
@@ -169,6 +170,7 @@ class TabletopEnv(JsonSpec, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
     """  # noqa: E501
 
     metadata = {"render_modes": ["human", "rgb_array"], "render_fps": RATE}  # noqa: RUF012
+    _window_title = "Legible table"
 
     def __init__(
         self,
@@ -190,10 +192,7 @@ class TabletopEnv(JsonSpec, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
         threshold: float = 0.8,
         render_mode: str | None = None,
     ) -> None:
-        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
-            raise ValueError(
-                f"`render_mode` must be None or one of {self.metadata['render_modes']}, got {render_mode!r}"
-            )
+        self._set_render_mode(render_mode)
         self.settings = TableSettings(
             task=task,
             layout=layout,
@@ -209,7 +208,6 @@ class TabletopEnv(JsonSpec, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
             crossing_cost=crossing_cost,
             threshold=threshold,
         )
-        self.render_mode = render_mode
         start, layout = self.settings.task.graph.start, self.settings.layout
         self._game = TableGame(self.settings.task, self.settings.rules)
         self._game.begin(layout, layout.place(start), start)
@@ -218,7 +216,6 @@ class TabletopEnv(JsonSpec, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
         self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
         self.observation_space = self._observer.space
         self._chosen: TabletopLayout | None = None
-        self._window: Any = None
 
     def _make_team(self, partner: Any, predictor: Any) -> Team:
         if partner is None:
@@ -296,36 +293,6 @@ class TabletopEnv(JsonSpec, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
         if self.render_mode == "human":
             self.render()
         return self._observer.observe(game, self._team), reward, game.progress.is_over, False, self._info()
-
-    def render(self) -> Any:
-        """Show the table: a picture ``(H, W, 3)`` uint8, or a window (None).
-
-        The picture is made by :func:`~legible_envs.tabletop.rendering.draw_scene`.
-        """
-        if self.render_mode is None:
-            name = self.spec.id if self.spec is not None else type(self).__name__
-            gym.logger.warn(
-                "You are calling render method without specifying any render mode. You can specify the render_mode at "
-                f'initialization, e.g. gym.make("{name}", render_mode="rgb_array")'
-            )
-            return None
-        from legible_envs.tabletop.rendering import draw_scene
-
-        picture = draw_scene(self.view())
-        if self.render_mode == "rgb_array":
-            return picture
-        if self._window is None:
-            from legible_envs.drawing.window import Window
-
-            self._window = Window("Legible table", fps=self.metadata["render_fps"])
-        self._window.show(picture)
-        return None
-
-    def close(self) -> None:
-        """Close the window, if there is one."""
-        if self._window is not None:
-            self._window.close()
-            self._window = None
 
     # -- layouts -------------------------------------------------------------------------------------------------------
 
@@ -409,6 +376,11 @@ class TabletopEnv(JsonSpec, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.floa
     def max_speed(self) -> float:
         """Of the hand, m/s: an action of length 1."""
         return self.settings.rules.max_speed
+
+    def _picture(self) -> npt.NDArray[np.uint8]:
+        from legible_envs.tabletop.rendering import draw_scene
+
+        return draw_scene(self.view())
 
     def view(self) -> TableView:
         """A snapshot of the table, for drawing."""

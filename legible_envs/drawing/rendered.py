@@ -1,0 +1,78 @@
+"""What every environment here does with its pictures: hand them out, or show them in a window of its own."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["Rendered", "Windowed"]
+
+
+class Windowed:
+    """Opens a window with the first picture shown."""
+
+    metadata: dict[str, Any]
+    render_mode: str | None
+    _window_title = ""
+    _window: Any = None
+
+    def _set_render_mode(self, mode: str | None) -> None:
+        """Take the render mode.
+
+        Raises:
+            ValueError: The environment has no such mode.
+        """
+        if mode is not None and mode not in self.metadata["render_modes"]:
+            raise ValueError(f"`render_mode` must be None or one of {self.metadata['render_modes']}, got {mode!r}")
+        self.render_mode = mode
+
+    def _show(self, picture: npt.NDArray[np.uint8]) -> None:
+        if self._window is None:
+            from legible_envs.drawing.window import Window
+
+            self._window = Window(self._window_title, fps=self.metadata["render_fps"])
+        self._window.show(picture)
+
+    def _close_window(self) -> None:
+        if self._window is not None:
+            self._window.close()
+            self._window = None
+
+
+class Rendered(Windowed):
+    """``render`` and ``close`` of an environment that can draw itself."""
+
+    def render(self) -> Any:
+        """Show the scene, as ``render_mode`` says.
+
+        Returns:
+            A picture ``(H, W, 3)`` uint8 (``"rgb_array"``), a drawing in text (``"ansi"``), or None: ``"human"`` shows
+            the picture in a window.
+        """
+        if self.render_mode is None:
+            spec = self.spec  # type: ignore[attr-defined]
+            name = spec.id if spec is not None else type(self).__name__
+            gym.logger.warn(
+                "You are calling render method without specifying any render mode. You can specify the render_mode at "
+                f'initialization, e.g. gym.make("{name}", render_mode="rgb_array")'
+            )
+            return None
+        if self.render_mode == "ansi":
+            return self._text()
+        picture = self._picture()
+        return picture if self.render_mode == "rgb_array" else self._show(picture)
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        self._close_window()
+
+    def _picture(self) -> npt.NDArray[np.uint8]:
+        """``(H, W, 3)`` the scene."""
+        raise NotImplementedError
+
+    def _text(self) -> str:
+        """The scene in characters, where ``"ansi"`` is among the render modes."""
+        raise NotImplementedError
