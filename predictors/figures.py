@@ -29,6 +29,7 @@ __all__ = [
     "footnote",
     "heading",
     "learning_curve_figure",
+    "round_ticks",
     "save_figure",
     "shade",
 ]
@@ -379,3 +380,12 @@ def save_figure(path: str | os.PathLike[str], svg: str) -> Path:
     target.parent.mkdir(parents=True, exist_ok=True)
     write_atomically(target, lambda stream: stream.write(svg.encode()))
     return target
+
+
+def round_ticks(low: float, high: float) -> list[float]:
+    """Two to eight round values from ``low`` to ``high``, for an axis; fewer only where there is no span."""
+    span = (high - low) or 1.0
+    step = 10.0 ** np.floor(np.log10(span / 5))
+    step *= min((m for m in (1, 2, 5, 10) if span / (m * step) <= 7), default=10)
+    # Zero instead of its negative, and no tail of digits from adding up steps.
+    return [round(float(v) + 0.0, 12) for v in np.arange(np.ceil(low / step), np.floor(high / step + 1e-9) + 1) * step]

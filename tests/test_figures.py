@@ -9,8 +9,10 @@ from xml.etree import ElementTree
 import numpy as np
 import pandas as pd
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from predictors.figures import accuracy_figure, confusion_figure, learning_curve_figure, save_figure
+from predictors.figures import accuracy_figure, confusion_figure, learning_curve_figure, round_ticks, save_figure
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -98,3 +100,23 @@ def test_figures_are_written_whole(tmp_path: Path) -> None:
     assert path.read_text(encoding="utf-8") == svg
     with pytest.raises(ValueError, match=r"FILE\.svg"):
         save_figure(tmp_path / "a.png", svg)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "expected"),
+    [
+        (0.0, 1.0, [0, 0.2, 0.4, 0.6, 0.8, 1.0]),
+        (-1.6, 0.3, [-1.5, -1.0, -0.5, 0.0]),
+        (41.4, 56.3, [45.0, 50.0, 55.0]),
+        (7.0, 7.0, [7.0]),
+    ],
+)
+def test_ticks_are_round_and_lie_within(low, high, expected):
+    assert round_ticks(low, high) == expected
+
+
+@given(low=st.floats(-1e6, 1e6), span=st.floats(1e-3, 1e6))
+def test_there_are_a_few_ticks(low, span):
+    ticks = round_ticks(low, low + span)
+    assert 2 <= len(ticks) <= 8
+    assert all(low - 1e-6 * span <= value <= low + span * (1 + 1e-6) for value in ticks)

@@ -415,7 +415,7 @@ def test_recorded_people_are_read_as_well_as_measured_before() -> None:
     assert len(known) == len(LAYOUTS) * len(REFERENCE.keys() & {setting.label for setting in PREDICTORS})
     for row in known.itertuples():
         assert row.difference > -0.03, row  # one repeat of the three that are published
-    fixed = known[known["predictor"].isin(["shortest distance", "Eq. 1", "Eq. 1, soft costs", "MaxEnt IRL"])]
+    fixed = known[known["predictor"].isin(["shortest distance", "Eq. 1", "Eq. 1 (soft costs)", "MaxEnt IRL"])]
     assert fixed["difference"].abs().max() < 0.003
 
 

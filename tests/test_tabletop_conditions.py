@@ -360,7 +360,7 @@ def test_what_is_said_below_a_figure_stands_in_it(results: tables.Results) -> No
 
 
 def test_pieces_of_figures() -> None:
-    assert slug("Gaussian, paper's index", "Both") == "gaussian_paper_s_index_both"
+    assert slug("Gaussian (paper's index)", "Both") == "gaussian_paper_s_index_both"
     table = pd.DataFrame({"a": ["y", "x", "y"], "b": [1, 2, 0]})
     assert in_order(table, a=["x", "y"], b=[0, 1, 2])["b"].tolist() == [2, 0, 1]
     bars = pd.DataFrame({"condition": ["A", "B"], "p": [0.001, 0.0042], "q": [float("nan"), 0.002]})

@@ -51,8 +51,8 @@ UNTRAINED: Final = (
 
 PREDICTORS: Final = (
     *UNTRAINED,
-    Setting("Eq. 1, soft costs", "bayesian", {"beta": 1.0, "costs": "soft"}),
-    Setting("Eq. 1, soft costs and prior", "bayesian", {"beta": 1.0, "costs": "soft", "prior": "empirical"}),
+    Setting("Eq. 1 (soft costs)", "bayesian", {"beta": 1.0, "costs": "soft"}),
+    Setting("Eq. 1 (soft costs, prior)", "bayesian", {"beta": 1.0, "costs": "soft", "prior": "empirical"}),
     Setting("MaxEnt IRL", "maxent-irl"),
     Setting("MaxEnt IRL with prior", "maxent-irl", {"prior": "empirical"}),
     Setting("n-gram", "grid-ngram"),
@@ -67,7 +67,7 @@ NEURAL: Final = (Setting("GRU", "recurrent"), Setting("Transformer", "transforme
 REFERENCE: Final[Mapping[str, tuple[float, float, float, float]]] = {
     "shortest distance": (0.605, 0.293, 0.350, 0.448),
     "Eq. 1": (0.712, 0.337, 0.471, 0.378),
-    "Eq. 1, soft costs": (0.754, 0.323, 0.444, 0.453),
+    "Eq. 1 (soft costs)": (0.754, 0.323, 0.444, 0.453),
     "MaxEnt IRL": (0.754, 0.323, 0.444, 0.454),
     "MaxEnt IRL with prior": (0.941, 0.413, 0.666, 0.449),
     "k-NN": (0.930, 0.422, 0.676, 0.454),

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from predictors.figures import COLOURS, Drawing, footnote, heading
+from predictors.figures import COLOURS, Drawing, footnote, heading, round_ticks
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -43,7 +43,7 @@ def anytime_figure(curves: pd.DataFrame, *, title: str, width: float = 760, heig
     def y(score: float) -> float:
         return float(foot - (score - low) / ((high - low) or 1.0) * (foot - _TOP))
 
-    for value in _ticks(low, high):
+    for value in round_ticks(low, high):
         drawing.line([(_LEFT, y(value)), (right, y(value))], _RULE)
         drawing.text(_LEFT - 8, y(value) + 4, f"{value:g}", "end", fill=_SOFT)
     for power in range(int(np.floor(first)), int(np.ceil(last)) + 1):
@@ -73,11 +73,3 @@ def anytime_figure(curves: pd.DataFrame, *, title: str, width: float = 760, heig
         drawing, "The first point is the random layouts every search begins with. Score: legibility per execution."
     )
     return drawing.render()
-
-
-def _ticks(low: float, high: float) -> list[float]:
-    """Round values, about six."""
-    span = (high - low) or 1.0
-    step = 10.0 ** np.floor(np.log10(span / 5))
-    step *= min((m for m in (1, 2, 5, 10) if span / (m * step) <= 7), default=10)
-    return [float(v) for v in np.arange(np.ceil(low / step) * step, high + 1e-9, step)]

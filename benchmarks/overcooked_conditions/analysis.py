@@ -169,7 +169,7 @@ def _about_reading(metrics: pd.DataFrame, anova: pd.DataFrame, results: tables.R
         gain = wide["Legible"] - wide["Random"]
         beyond = wide["Legible"] - wide["Efficient"]
         lines.append(
-            f"{walker} people: from Random to Legible, accuracy (mean over 10 to 90 % observed) changes by "
+            f"{walker.capitalize()} people: from Random to Legible, accuracy (mean over 10 to 90 % seen) changes by "
             + ", ".join(f"{value:+.3f} ({name})" for name, value in gain.items())
             + "; from Efficient to Legible by "
             + ", ".join(f"{value:+.3f} ({name})" for name, value in beyond.items())

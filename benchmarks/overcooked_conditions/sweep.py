@@ -67,7 +67,7 @@ FITTED_SOURCE: Final = (
 )
 
 PREDICTORS: Final = (
-    Judge("Eq. 1, IRL costs", "bayesian", {"cell_costs": "learned"}),
+    Judge("Eq. 1 (IRL costs)", "bayesian", {"cell_costs": "learned"}),
     Judge("shortest distance", "shortest-distance", learns=False),
     Judge("logistic", "grid-logistic"),
     Judge("k-NN", "grid-knn"),

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from predictors.figures import COLOURS, Drawing, footnote, heading, save_figure
+from predictors.figures import COLOURS, Drawing, footnote, heading, round_ticks, save_figure
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -28,10 +28,10 @@ def scatter_figure(places: pd.DataFrame, title: str, subtitle: str) -> str:
         y = bottom - value * (bottom - top)
         drawing.line([(left, y), (right, y)], _RULE if value else _SOFT)
         drawing.text(left - 9, y + 4, f"{100 * value:.0f} %", "end", fill=_SOFT)
-    for value in np.linspace(low, high, 6)[1:-1]:
+    for value in round_ticks(low, high):
         x = left + (value - low) / (high - low) * (right - left)
         drawing.line([(x, bottom), (x, bottom + 5)], _SOFT)
-        drawing.text(x, bottom + 20, f"{value:.2f}".replace("-", "\u2212"), "middle", fill=_SOFT)
+        drawing.text(x, bottom + 20, f"{value:g}".replace("-", "\u2212"), "middle", fill=_SOFT)
     drawing.text((left + right) / 2, bottom + 42, "legibility of the stage (Eq. 2, mean)", "middle")
     middle = (top + bottom) / 2
     drawing.text(16, middle, "accuracy", "middle", transform=f"rotate(-90 16 {middle:.1f})")

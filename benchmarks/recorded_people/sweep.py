@@ -15,7 +15,7 @@ MIN_WALKS: Final = 10
 BOOTSTRAPS: Final = 2000
 """Resamples behind an interval."""
 
-_LABELS: Final = ("shortest distance", "Eq. 1", "Eq. 1, soft costs", "MaxEnt IRL", "k-NN", "logistic")
+_LABELS: Final = ("shortest distance", "Eq. 1", "Eq. 1 (soft costs)", "MaxEnt IRL", "k-NN", "logistic")
 
 
 @dataclass(frozen=True)

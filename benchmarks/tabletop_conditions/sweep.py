@@ -50,7 +50,7 @@ PUBLISHED_SPREAD: Final[Mapping[str, Mapping[str, float]]] = {
 """Tung et al. (HRI 2024): covariances of reaches to one goal, m^4 and m^2."""
 
 PREDICTORS: Final = (
-    Judge("Gaussian, paper's index", "reach-gaussian", {"online": "fraction", "alignment": "mean"}),
+    Judge("Gaussian (paper's index)", "reach-gaussian", {"online": "fraction", "alignment": "mean"}),
     Judge("nearest cube", "shortest-distance", {"metric": "euclidean"}, learns=False),
     Judge("Gaussian", "reach-gaussian"),
     Judge("Eq. 1", "reach-bayesian", learns=False),
