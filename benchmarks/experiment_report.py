@@ -60,10 +60,21 @@ def _markup(text: str) -> Any:
 def _content(section: Section) -> dict[str, Any]:
     return {
         "title": section.title,
-        "paragraphs": [part.strip() for part in section.text.split("\n\n") if part.strip()],
+        "paragraphs": [_with_code(part.strip()) for part in section.text.split("\n\n") if part.strip()],
         "tables": [_table(caption, table) for caption, table in section.tables.items()],
         "figures": [(path.stem.replace("_", " "), _data_url(path), _is_wide(path)) for path in section.figures],
     }
+
+
+def _with_code(text: str) -> Any:
+    """Words for the page, where what stands between backticks is set as code."""
+    from markupsafe import Markup, escape
+
+    parts = text.split("`")
+    if len(parts) % 2 == 0:
+        return escape(text)
+    marked = (Markup("<code>{}</code>").format(part) if i % 2 else escape(part) for i, part in enumerate(parts))
+    return Markup("").join(marked)
 
 
 def _table(caption: str, table: pd.DataFrame) -> dict[str, Any]:
@@ -71,7 +82,8 @@ def _table(caption: str, table: pd.DataFrame) -> dict[str, Any]:
 
     numeric = [is_numeric_dtype(table[name]) and not is_bool_dtype(table[name]) for name in table.columns]
     return {
-        "caption": caption,
+        "caption": _with_code(caption),
+        "label": caption.replace("`", ""),
         "columns": [(str(name).replace("_", " "), kind) for name, kind in zip(table.columns, numeric, strict=True)],
         "rows": [
             [(_text(value), kind) for value, kind in zip(row, numeric, strict=True)]

@@ -10,6 +10,8 @@ from benchmarks.optimizer_comparison.analysis import (
     beside_local_search,
     beside_published,
     gaps,
+    leaderboard,
+    ours_against,
     pairwise,
     summary,
 )
@@ -63,7 +65,8 @@ def test_a_small_run_leaves_results_tables_and_figures(folder):
         layout = OvercookedLayout.from_ascii(row["drawing"])
         assert workspace.legibility(workspace.encode(layout)) == pytest.approx(row["best"])
     assert {path.name for path in (folder / "tables").iterdir()} == {
-        f"{name}.csv" for name in ("summary", "pairs", "gaps", "published", "local_search", "anytime")
+        f"{name}.csv"
+        for name in ("summary", "leaderboard", "pairs", "ours", "gaps", "published", "local_search", "anytime")
     }
     assert {path.name for path in (folder / "figures").iterdir()} == {
         "anytime_5x5_300.svg",
@@ -77,7 +80,8 @@ def test_analysis_reads_files_alone_and_says_what_came_out(folder, monkeypatch):
     parts = sections(folder)
     assert {path.name: path.read_bytes() for path in (folder / "tables").iterdir()} == before
     words = " ".join(part.text for part in parts)
-    assert "5x5, 400 evaluations: no significant difference" in words
+    assert "no difference shown in 2 of 2" in words
+    assert "shows 300 evaluations" in words
     assert "rank as published on" in words
     assert all(path.exists() for part in parts for path in part.figures)
 
@@ -145,6 +149,31 @@ def test_ranks_beside_the_published_ones():
     assert table["published_rank"].to_dict() == {"MAP-Elites": 1.0, "NSLC": 2.0, "DE": 3.0}
     assert table.loc["DE", "published"] == PUBLISHED["DE"]["5x5"] == -129.28
     assert beside_published(ends_of({"improve": [1.0], "nslc": [2.0]})).empty
+
+
+def test_verdicts_on_our_emitter():
+    clear = ends_of({"annealing": [float(i) for i in range(10, 20)], "improve": [float(i) for i in range(10)]})
+    unclear = ends_of({"annealing": [1.0, 2.0], "improve": [0.0, 3.0]}, grid="7x7")
+    reverse = ends_of({"annealing": [0.0] * 10, "improve": [1.0] * 10, "random": [9.0] * 10}, grid="9x9")
+    table = ours_against(pairwise(pd.concat([clear, unclear, reverse])), "improve")
+    assert table.set_index("grid")["verdict"].to_dict() == {
+        "5x5": "better",
+        "7x7": "no difference shown",
+        "9x9": "worse",
+    }
+
+
+def test_the_leaderboard_shows_the_largest_budget_of_all_methods():
+    parts = [
+        ends_of({"annealing": [3.0, 5.0], "random": [1.0, 1.0]}, grid=grid, budget=budget)
+        for grid in ("5x5", "7x7")
+        for budget in ("2000", "20000", "paper")
+    ]
+    large = ends_of({"annealing": [9.0, 9.0]}, grid="7x7", budget="200000")
+    table = leaderboard(summary(pd.concat([*parts, large])))
+    assert table.columns.tolist() == ["method", "budget", "5x5", "7x7"]
+    assert table.iloc[0].tolist() == ["annealing", "20000", "4.0 (1.4)", "4.0 (1.4)"]
+    assert table["method"].tolist() == ["annealing", "random"]
 
 
 def test_our_searches_beside_a_plain_local_search():

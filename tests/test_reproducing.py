@@ -93,8 +93,9 @@ def test_the_page_holds_its_pictures_and_asks_for_nothing(tmp_path: Path) -> Non
         {"name": ["<b>", None], "value": [0.123456, float("nan")], "count": [1, 2], "good": [True, False]}
     )
     page = write_experiment_report(
-        tmp_path, [Section("A", "", {"Numbers": table}, [picture])], title="T", lede="L"
+        tmp_path, [Section("A", "Say `a<b` twice.\n\nOne ` alone", {"Numbers": table}, [picture])], title="T", lede="L"
     ).read_text()
+    assert "<p>Say <code>a&lt;b</code> twice.</p><p>One ` alone</p>" in page
     assert "data:image/svg+xml;base64," in page
     assert "&lt;b&gt;" in page
     assert "0.1235" in page

@@ -16,7 +16,17 @@ from predictors.statistics import holm
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["anytime", "beside_local_search", "beside_published", "gaps", "pairwise", "sections", "summary"]
+__all__ = [
+    "anytime",
+    "beside_local_search",
+    "beside_published",
+    "gaps",
+    "leaderboard",
+    "ours_against",
+    "pairwise",
+    "sections",
+    "summary",
+]
 
 _KEYS = ["grid", "budget", "method"]
 _REACHED = 1e-9
@@ -38,8 +48,9 @@ def sections(folder: str | Path) -> list[Section]:
     ends = rows[rows["moment"] == "end"]
     best, pairs, curves = summary(ends), pairwise(ends), anytime(rows)
     gap, published, local = gaps(ends), beside_published(ends), beside_local_search(ends)
-    tables = {"summary": best, "pairs": pairs, "gaps": gap, "published": published, "local_search": local}
-    tables["anytime"] = curves
+    ours, board = ours_against(pairs, "improve"), leaderboard(best)
+    tables = {"summary": best, "leaderboard": board, "pairs": pairs, "ours": ours, "gaps": gap}
+    tables |= {"published": published, "local_search": local, "anytime": curves}
     write_tables(folder / "tables", tables.items())
     drawn = []
     for (grid, budget), part in curves.groupby(["grid", "budget"], sort=False):
@@ -49,8 +60,17 @@ def sections(folder: str | Path) -> list[Section]:
         drawn.append(folder / "figures" / f"anytime_{grid}_{budget}.svg")
         save_figure(drawn[-1], text)
     return [
-        Section("What each search finds", _ours_in_words(pairs, best), {"At every budget": best}, drawn),
-        Section("Are the differences luck?", _TESTS, {"Pairs of methods": pairs}),
+        Section(
+            "What each search finds",
+            _best_in_words(board),
+            {"Best score: mean (standard deviation) over searches": board, "At every budget": best},
+            drawn,
+        ),
+        Section(
+            "Are the differences luck?",
+            f"{_ours_in_words(ours)}\n\n{_TESTS}",
+            {f"`{OURS}` against `improve`": ours, "Pairs of methods": pairs},
+        ),
         Section("Optimality on 5x5", _gap_in_words(gap), {"Gap to the proven optimum": gap}),
         Section("Beside a plain local search", _LOCAL, {f"Searches by `{OURS}`": local}),
         Section("Beside the paper", _published_in_words(published), {"Ranks of the paper's methods": published}),
@@ -108,6 +128,41 @@ def pairwise(ends: pd.DataFrame) -> pd.DataFrame:
             tables.append(pd.DataFrame(rows).assign(p_holm=holm(np.array([row["p"] for row in rows]))))
     columns = ["grid", "budget", "a", "b", "difference", "superiority", "hedges_g", "p", "p_holm"]
     return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=columns)
+
+
+def ours_against(pairs: pd.DataFrame, other: str) -> pd.DataFrame:
+    """The rows of :func:`pairwise` for our emitter and another, with a ``verdict`` at the 1 % level of single tests."""
+    own = pairs[(pairs["a"] == OURS) & (pairs["b"] == other)].drop(columns=["a", "b"])
+    better = np.where(own["difference"] > 0, "better", "worse")
+    return own.assign(verdict=np.where(own["p"] < 0.01, better, "no difference shown")).reset_index(drop=True)
+
+
+def leaderboard(best: pd.DataFrame) -> pd.DataFrame:
+    """Best scores at the largest budget that every method was given, a row per method and a column per grid.
+
+    Args:
+        best: What :func:`summary` returns.
+
+    Returns:
+        Columns ``method``, ``budget``, and a text ``"mean (sd)"`` for each grid; ordered by their mean rank.
+    """
+    import pandas as pd
+
+    equal = best[best["budget"] != "paper"]
+    shared = equal.groupby("budget", sort=False)["method"].nunique()
+    shared = shared[shared == equal["method"].nunique()]
+    if shared.empty:
+        return pd.DataFrame(columns=["method", "budget"])
+    budget = max(shared.index, key=int)
+    own = equal[equal["budget"] == budget]
+    own = own.assign(text=[f"{mean:.1f} ({sd:.1f})" for mean, sd in zip(own["best"], own["best_sd"], strict=True)])
+    table = own.pivot(index="method", columns="grid", values="text")[list(dict.fromkeys(own["grid"]))]
+    ranks = own["best"].round(9).groupby(own["grid"]).rank(ascending=False).groupby(own["method"]).mean()
+    return (
+        table.loc[ranks.sort_values(kind="stable").index]
+        .reset_index()
+        .assign(budget=budget)[["method", "budget", *table.columns]]
+    )
 
 
 def hedges_g(x: np.ndarray[Any, Any], y: np.ndarray[Any, Any]) -> float:
@@ -219,38 +274,48 @@ _LOCAL = (
 )
 
 
-def _ours_in_words(pairs: pd.DataFrame, best: pd.DataFrame) -> str:
-    own = pairs[(pairs["a"] == OURS) & (pairs["b"] == "improve")]
-    said = []
-    for row in own.to_dict("records"):
-        verdict = "no significant difference"
-        if row["p"] < 0.01:
-            verdict = "better" if row["difference"] > 0 else "worse"
-        said.append(
-            f"{row['grid']}, {int(row['budget']):,} evaluations: {verdict} ({row['difference']:+.2f}, "
-            f"superiority {row['superiority']:.2f}, p = {row['p']:.2g})"
-        )
+def _best_in_words(board: pd.DataFrame) -> str:
+    scored = (
+        "Every search at a budget scores the same number of layouts; the paper's budgets in iterations apart, where "
+        "this differs by orders of magnitude (see `scored`)."
+    )
+    if board.empty:
+        return scored
+    budget = f"{int(board['budget'].iloc[0]):,}"
+    return f"{scored} The first table shows {budget} evaluations, the largest budget that every method was given."
+
+
+def _ours_in_words(ours: pd.DataFrame) -> str:
+    counts = ours["verdict"].value_counts()
+    verdicts = ("better", "worse", "no difference shown")
+    said = ", ".join(f"{name} in {counts[name]}" for name in verdicts if name in counts)
     return (
-        "Every search scores the same number of layouts (the paper's budgets in iterations apart: there it differs by "
-        f"orders of magnitude, see `scored`). Our emitter (`{OURS}`) against the paper's (`improve`), single tests at "
-        "the 1 % level:\n\n" + "; ".join(said) + "."
+        f"Our emitter (`{OURS}`) against the paper's (`improve`), a single test for each grid and budget at the 1 % "
+        f"level: {said or 'not run'} of {len(ours)}. Where both always find the same best layout nothing can be shown."
     )
 
 
 def _gap_in_words(gap: pd.DataFrame) -> str:
     if gap.empty:
         return "The grid was not run."
-    always = gap[gap["reached"] == 1.0]
-    named = ", ".join(f"{row['method']} ({row['budget']})" for row in always.to_dict("records")) or "nobody"
-    return f"The best of all valid 5x5 kitchens scores {OPTIMUM_5X5:.6f}. In every search it was reached by: {named}."
+    said = []
+    for budget, part in gap.groupby("budget", sort=False):
+        named = part.loc[part["reached"] == 1.0, "method"].tolist()
+        names = "all methods" if len(named) == len(part) else ", ".join(named) or "none"
+        said.append(f"{_budget_in_words(str(budget))} by {names}")
+    return f"The best of all valid 5x5 kitchens scores {OPTIMUM_5X5:.6f}. Reached in every search: {'; '.join(said)}."
+
+
+def _budget_in_words(budget: str) -> str:
+    return "at the paper's iterations" if budget == "paper" else f"at {int(budget):,} evaluations"
 
 
 def _published_in_words(published: pd.DataFrame) -> str:
     parts = []
     for budget, part in published.groupby("budget", sort=False):
         same = int((part["rank"] == part["published_rank"]).groupby(part["grid"]).all().sum())
-        name = "the paper's iterations" if budget == "paper" else f"{int(str(budget)):,} evaluations"
-        parts.append(f"at {name} the three methods rank as published on {same} of {part['grid'].nunique()} grids")
+        grids = part["grid"].nunique()
+        parts.append(f"{_budget_in_words(str(budget))} the three methods rank as published on {same} of {grids} grids")
     return (
         "Units differ: the paper's best layouts lie near our random medians, so values cannot be compared, ranks can. "
         f"Published: MAP-Elites before NSLC before DE everywhere. Here {'; '.join(parts)}. At equal iterations the "

@@ -47,7 +47,7 @@ def anytime_figure(curves: pd.DataFrame, *, title: str, width: float = 760, heig
         drawing.line([(_LEFT, y(value)), (right, y(value))], _RULE)
         drawing.text(_LEFT - 8, y(value) + 4, f"{value:g}", "end", fill=_SOFT)
     for power in range(int(np.floor(first)), int(np.ceil(last)) + 1):
-        for step in (1, 2, 5):
+        for step in (1, 2, 5) if last - first < 2 else (1,):
             scored = float(step * 10**power)
             if first - 1e-9 <= np.log10(scored) <= last + 1e-9:
                 drawing.line([(x(scored), foot), (x(scored), foot + 5)], _SOFT)
