@@ -15,13 +15,13 @@ import numpy as np
 from legible_envs.compiled import kernel
 from legible_envs.tabletop.evidence import add_weighted, exponentials, settle_ties, sum_candidates
 from legible_envs.tabletop.visibility import (
-    SHRINK,
     Floats,
     Ints,
-    clear,
+    block,
     corners_between,
     first_corner,
     grow,
+    into_box,
     is_free,
     keep_corners,
     norm,
@@ -80,7 +80,6 @@ class Scratch(NamedTuple):
     between: Floats
     target_points: Floats
     lengths: Floats
-    after: Ints
     path: Floats
     x: Floats
     y: Floats
@@ -89,11 +88,13 @@ class Scratch(NamedTuple):
     evidence: Floats
     slack: Floats
     most: Floats
-    away: Floats
-    seen: Ints
-    hints: Ints
     box_u: Floats
     box_v: Floats
+    blocked: Ints
+    near_x: Floats
+    near_y: Floats
+    away: Floats
+    ways: Floats
     value: Floats
     total: Floats
     sums: Floats
@@ -113,7 +114,6 @@ def make_scratch(num_obstacles: int, tables: ReachTables) -> Scratch:
         np.empty((corners, corners)),
         np.empty((len(tables.targets), 2)),
         np.empty((len(tables.targets), corners)),
-        np.empty((len(tables.targets), corners), dtype=np.int64),
         np.empty((corners + 2, 2)),
         np.empty(most * k),
         np.empty(most * k),
@@ -122,11 +122,13 @@ def make_scratch(num_obstacles: int, tables: ReachTables) -> Scratch:
         np.empty((most, most * k)),
         np.empty((most, most * k)),
         np.empty(most * k),
-        np.empty(corners),
-        np.empty(corners, dtype=np.int64),
-        np.empty(most, dtype=np.int64),
         np.empty((num_obstacles, most * k)),
         np.empty((num_obstacles, most * k)),
+        np.empty(most * k, dtype=np.int64),
+        np.empty(most * k),
+        np.empty(most * k),
+        np.empty(most * k),
+        np.empty((most, most * k)),
         np.empty(tables.stage_weights.shape[1]),
         np.empty(tables.stage_weights.shape[1]),
         np.empty(tables.stage_weights.shape[1]),
@@ -149,37 +151,6 @@ def place_reach(path: Floats, count: int, length: float, fractions: Floats, x: F
         x[k] = path[leg, 0] + share * (path[leg + 1, 0] - path[leg, 0])
         y[k] = path[leg, 1] + share * (path[leg + 1, 1] - path[leg, 1])
         seen[k] = at
-
-
-@kernel
-def into_box(box: Floats, x: Floats, y: Floats, u: Floats, v: Floats) -> None:
-    """Coordinates of points in the frame of a box."""
-    cos, sin = box[2], box[3]
-    for p in range(len(x)):
-        dx, dy = x[p] - box[0], y[p] - box[1]
-        u[p] = dx * cos + dy * sin
-        v[p] = dy * cos - dx * sin
-
-
-@kernel
-def block(box: Floats, u: Floats, v: Floats, x: float, y: float, slack: Floats) -> None:
-    """Raise ``slack`` of points (in the frame of a box) to at least 0 if the box is in the straight way to ``(x, y)``.
-
-    The three separating axes of ``clear``; without branches, so that it is vectorised.
-    """
-    cos, sin = box[2], box[3]
-    a, b = box[4] - SHRINK, box[5] - SHRINK
-    dx, dy = x - box[0], y - box[1]
-    to_u, to_v = dx * cos + dy * sin, dy * cos - dx * sin
-    for p in range(len(u)):
-        mu, mv = 0.5 * (u[p] + to_u), 0.5 * (v[p] + to_v)
-        du, dv = abs(0.5 * (to_u - u[p])), abs(0.5 * (to_v - v[p]))
-        # |mu dv - mv du|, with the signs of the step
-        cross = abs(mu * (0.5 * (to_v - v[p])) - mv * (0.5 * (to_u - u[p])))
-        along, across, turned = a + du - abs(mu), b + dv - abs(mv), a * dv + b * du - cross
-        least = along if along < across else across
-        least = least if least < turned else turned
-        slack[p] = least if least > slack[p] else slack[p]
 
 
 @kernel
@@ -221,6 +192,43 @@ def find_blocked(
 
 
 @kernel
+def gather_blocked(num_boxes: int, num_points: int, scratch: Scratch) -> int:
+    """Move the points with any blocked goal to the front of ``near_x``, ``near_y``, ``box_u`` and ``box_v``.
+
+    Returns:
+        How many there are; ``scratch.blocked`` says which.
+    """
+    count = 0
+    for p in range(num_points):
+        if scratch.most[p] >= 0.0:
+            scratch.blocked[count] = p
+            scratch.near_x[count] = scratch.x[p]
+            scratch.near_y[count] = scratch.y[p]
+            for i in range(num_boxes):
+                scratch.box_u[i, count] = scratch.box_u[i, p]
+                scratch.box_v[i, count] = scratch.box_v[i, p]
+            count += 1
+    return count
+
+
+@kernel
+def reach_corner(x: Floats, y: Floats, corner: Floats, slack: Floats, away: Floats) -> None:
+    """``away`` = distance of each point to a corner, inf where ``slack`` says that a box is in the way."""
+    for p in range(len(x)):
+        dx, dy = corner[0] - x[p], corner[1] - y[p]
+        distance = np.sqrt(dx * dx + dy * dy)
+        away[p] = distance if slack[p] < 0.0 else np.inf
+
+
+@kernel
+def shorten(away: Floats, rest: float, ways: Floats) -> None:
+    """``ways = min(ways, away + rest)``."""
+    for p in range(len(away)):
+        way = away[p] + rest
+        ways[p] = way if way < ways[p] else ways[p]
+
+
+@kernel
 def detour_excess(
     boxes: Floats,
     count: int,
@@ -231,35 +239,31 @@ def detour_excess(
     optimal: Floats,
     scratch: Scratch,
 ) -> None:
-    """Replace the excess of blocked pairs of point and goal by that of the best way round a corner."""
+    """Replace the excess of blocked pairs of point and goal by that of the best way round a corner.
+
+    All corners are tried for all blocked points, in loops without branches: that is faster than to look for the few
+    that matter.
+    """
     find_blocked(boxes, tables, first, num_goals, num_points, scratch)
-    corners, away, seen = scratch.corners, scratch.away, scratch.seen
-    hints = scratch.hints[:num_goals]
-    hints[:] = 0
-    for p in range(num_points):
-        if scratch.most[p] < 0.0:
-            continue
-        x, y = scratch.x[p], scratch.y[p]
-        for i in range(count):
-            away[i] = norm(corners[i, 0] - x, corners[i, 1] - y)
-            seen[i] = -1
+    n = gather_blocked(len(boxes), num_points, scratch)
+    if n == 0:
+        return
+    x, y, slack, away = scratch.near_x[:n], scratch.near_y[:n], scratch.most[:n], scratch.away[:n]
+    for g in range(num_goals):
+        scratch.ways[g, :n] = np.inf
+    for c in range(count):
+        corner = scratch.corners[c]
+        slack[:] = -1.0
+        for i in range(len(boxes)):
+            block(boxes[i], scratch.box_u[i, :n], scratch.box_v[i, :n], corner[0], corner[1], slack)
+        reach_corner(x, y, corner, slack, away)
         for g in range(num_goals):
-            if scratch.slack[g, p] < 0.0:
-                continue
-            lengths = scratch.lengths[tables.goal_target[first + g]]
-            # The corner that was best from the point before is mostly best again; few others then need a look.
-            hint = hints[g]
-            best = np.inf
-            for k in range(-1, count):
-                i = hint if k < 0 else k
-                length = away[i] + lengths[i]
-                if length < best:
-                    if seen[i] < 0:
-                        seen[i] = 1 if clear(boxes, x, y, corners[i, 0], corners[i, 1]) else 0
-                    if seen[i] == 1:
-                        best = length
-                        hints[g] = i
-            scratch.excess[g, p] = best + (scratch.observed[p] - optimal[g])
+            shorten(away, scratch.lengths[tables.goal_target[first + g], c], scratch.ways[g, :n])
+    for g in range(num_goals):
+        for k in range(n):
+            p = scratch.blocked[k]
+            if scratch.slack[g, p] >= 0.0:
+                scratch.excess[g, p] = scratch.ways[g, k] + (scratch.observed[p] - optimal[g])
 
 
 @kernel
@@ -317,7 +321,7 @@ def score_table(
                 return
         count = keep_corners(boxes, size, corners)
         corners_between(boxes, corners, count, scratch.between)
-        path_tables(boxes, corners, count, scratch.between, target_points, scratch.lengths, scratch.after)
+        path_tables(boxes, corners, count, scratch.between, target_points, scratch.lengths)
     distance = 0.0
     for leg in range(len(tables.leg_from)):
         a, t = tables.leg_from[leg], tables.leg_target[leg]
@@ -343,7 +347,9 @@ def score_table(
                 boxes, corners, count, scratch.lengths[t], start[0], start[1], goal[0], goal[1]
             )
             optimal[g] = length
-            num_bends = write_path(corners, scratch.after[t], corner, start, goal, scratch.path)
+            num_bends = write_path(
+                boxes, corners, count, scratch.between, scratch.lengths[t], corner, start, goal, scratch.path
+            )
             mine = slice(g * per_goal, (g + 1) * per_goal)
             x, y, observed = scratch.x[mine], scratch.y[mine], scratch.observed[mine]
             place_reach(scratch.path, num_bends, length, tables.fractions, x, y, observed)

@@ -57,7 +57,13 @@ def batch_lengths(
 
 @kernel
 def batch_paths(
-    boxes: Floats, size: tuple[float, float], corners: Floats, goals: Floats, tables: Floats, after: Ints, start: Floats
+    boxes: Floats,
+    size: tuple[float, float],
+    corners: Floats,
+    between: Floats,
+    goals: Floats,
+    tables: Floats,
+    start: Floats,
 ) -> tuple[Floats, Ints]:
     """Shortest paths from ``start [2]`` to each of ``goals [n, 2]``.
 
@@ -73,5 +79,7 @@ def batch_paths(
                     boxes, corners, len(corners), tables[g], start[0], start[1], goals[g, 0], goals[g, 1]
                 )
                 if length < np.inf:
-                    counts[g] = write_path(corners, after[g], first, start, goals[g], paths[g])
+                    counts[g] = write_path(
+                        boxes, corners, len(corners), between, tables[g], first, start, goals[g], paths[g]
+                    )
     return paths, counts

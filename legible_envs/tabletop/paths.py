@@ -55,11 +55,10 @@ class ShortestPaths:
         corners = np.empty((4 * len(rows), 2))
         count = keep_corners(self.boxes, self.size, corners)
         self.corners = corners[:count].copy()
-        between = np.empty((count, count))
-        corners_between(self.boxes, self.corners, count, between)
+        self._between = np.empty((count, count))
+        corners_between(self.boxes, self.corners, count, self._between)
         self._lengths = np.empty((len(self.goals), count))
-        self._after = np.empty((len(self.goals), count), dtype=np.int64)
-        path_tables(self.boxes, self.corners, count, between, self.goals, self._lengths, self._after)
+        path_tables(self.boxes, self.corners, count, self._between, self.goals, self._lengths)
 
     @classmethod
     def of(cls, layout: TabletopLayout) -> ShortestPaths:
@@ -96,9 +95,9 @@ class ShortestPaths:
             self.boxes,
             self.size,
             self.corners,
+            self._between,
             self.goals,
             self._lengths,
-            self._after,
             _points(np.asarray(start, dtype=np.float64)[None], "start")[0],
         )
         return [path[:count].copy() if count else None for path, count in zip(paths, counts, strict=True)]

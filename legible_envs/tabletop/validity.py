@@ -84,7 +84,6 @@ class Room(NamedTuple):
     corners: Floats
     between: Floats
     lengths: Floats
-    after: Ints
     is_known: npt.NDArray[np.bool_]
 
 
@@ -101,7 +100,6 @@ def make_room(rules: Rules) -> Room:
         np.empty((corners, 2)),
         np.empty((corners, corners)),
         np.empty((n, corners)),
-        np.empty((n, corners), dtype=np.int64),
         np.empty(n, dtype=np.bool_),
     )
 
@@ -245,7 +243,7 @@ def way(room: Room, grown: Floats, count: int, x: float, y: float, goal: int) ->
         return norm(points[goal, 0] - x, points[goal, 1] - y)
     one = slice(goal, goal + 1)
     if not room.is_known[goal]:
-        path_tables(grown, room.corners, count, room.between, points[one], room.lengths[one], room.after[one])
+        path_tables(grown, room.corners, count, room.between, points[one], room.lengths[one])
         room.is_known[goal] = True
     return first_corner(grown, room.corners, count, room.lengths[goal], x, y, points[goal, 0], points[goal, 1])[0]
 
