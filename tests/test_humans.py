@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import itertools
 import math
-import os
 import pickle
-import subprocess
-import sys
 from collections import Counter
 
 import gymnasium as gym
 import numpy as np
 import pytest
 from kitchens import random_kitchen, steps_between
+from plain_python import printed_both_ways
 from scipy.optimize import minimize_scalar
 from scipy.stats import chisquare
 
@@ -439,17 +437,7 @@ def test_kernels_run_as_plain_python():
         "print(*[round(float(walk.times[-1]), 6) for walks in people for walk in walks])\n"
         "print(fit_rationality(people[0] + people[1]).interval)"
     )
-    outputs = [
-        subprocess.run(
-            [sys.executable, "-c", code],
-            env={**os.environ, "NUMBA_DISABLE_JIT": disable},
-            capture_output=True,
-            text=True,
-            check=True,
-        ).stdout.split()
-        for disable in ("0", "1")
-    ]
-    numbers = [[float(word.strip("(),")) for word in output] for output in outputs]
+    numbers = [[float(word.strip("(),")) for word in text.split()] for text in printed_both_ways(code)]
     assert len(numbers[0]) == 1 + 24 + 24 + 2
     assert numbers[0] == pytest.approx(numbers[1], rel=1e-9)
 

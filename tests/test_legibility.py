@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-import os
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from kitchens import brute_force_legibility, brute_force_reach, random_kitchen
+from plain_python import printed_both_ways
 
 from legible_envs import LayoutError, TaskError
 from legible_envs.legibility import (
@@ -308,13 +306,9 @@ for kwargs in ({}, {"cell_costs": np.ones((5, 5))}):
     children = ws.perturb(g, 3, np.random.default_rng(1))
     print(repr(ws.legibility(children).tolist()), children.tolist())
 """
-    outputs = []
-    for disabled in ("0", "1"):
-        environment = {**os.environ, "NUMBA_DISABLE_JIT": disabled}
-        done = subprocess.run(
-            [sys.executable, "-c", script], env=environment, capture_output=True, text=True, check=True
-        )
-        outputs.append([eval(part) for part in done.stdout.replace("] [", "]\n[").split("\n") if part])
+    outputs = [
+        [eval(part) for part in text.replace("] [", "]\n[").split("\n") if part] for text in printed_both_ways(script)
+    ]
     for compiled, plain in zip(*outputs, strict=True):
         np.testing.assert_allclose(compiled, plain, atol=1e-12)
 

@@ -1,14 +1,12 @@
 """Legibility on a table: the kernels against the definition, which uses shapely and networkx for every cost."""
 
 import math
-import os
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from plain_python import printed_both_ways
 from table_oracle import PathOracle, legibility
 
 from legible_envs.errors import LayoutError, TaskError
@@ -319,16 +317,6 @@ def test_kernels_run_as_plain_python():
         "o = [VirtualObstacle((0.45, 0.2), 0.3), VirtualObstacle((0.85, 0.5), 1.5)];"
         "print(*[float(x[0]) for x in s.layout(s.task.layout.with_obstacles(o))])"
     )
-    environment = {k: v for k, v in os.environ.items() if k != "NUMBA_DISABLE_JIT"}
-    outcomes = []
-    for flag in ("0", "1"):
-        done = subprocess.run(
-            [sys.executable, "-c", code],
-            capture_output=True,
-            text=True,
-            check=True,
-            env={**environment, "NUMBA_DISABLE_JIT": flag},
-        )
-        outcomes.append([float(x) for x in done.stdout.split()])
+    outcomes = [[float(word) for word in text.split()] for text in printed_both_ways(code)]
     assert outcomes[0] == pytest.approx(outcomes[1], abs=1e-12)
     assert outcomes[0][3] > 1
