@@ -50,8 +50,8 @@ def test_nslc_in_the_papers_budget_is_ten_generations_of_twenty():
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("comparison")
-    tables = reproduce(folder, settings=TINY, workers=1)
-    assert tables == folder / "tables"
+    reproduce(folder, settings=TINY, workers=1)
+    sections(folder)
     return folder
 
 

@@ -12,7 +12,7 @@ from scipy import stats
 
 from benchmarks.cells import run_cells
 from benchmarks.recorded_people import analysis, run
-from benchmarks.recorded_people.analysis import correlate, detectable, places_of, spearman
+from benchmarks.recorded_people.analysis import correlate, detectable, places_of, spearman, spearman_rows
 from benchmarks.recorded_people.sweep import FULL, QUICK, reading_cells, score_cells
 from legible_envs.legibility import From, goal_legibility
 from legible_envs.overcooked import OvercookedLayout
@@ -68,6 +68,9 @@ def test_rank_correlation_is_scipys() -> None:
     for _ in range(20):
         x, y = rng.integers(0, 6, 15).astype(float), rng.normal(size=15)
         assert spearman(x, y) == pytest.approx(stats.spearmanr(x, y).statistic)
+        many = np.stack([rng.permutation(y) for _ in range(3)])
+        rows = spearman_rows(np.broadcast_to(x, many.shape), many)
+        assert rows.tolist() == [spearman(x, row) for row in many]
     assert math.isnan(spearman(np.ones(5), np.arange(5.0)))
 
 

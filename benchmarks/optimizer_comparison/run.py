@@ -30,21 +30,17 @@ def reproduce(
     scheduler: str | None = None,
     progress: Callable[[Event], object] | None = None,
     settings: Settings | None = None,
-) -> Path:
-    """Run what is not there yet, and write result files, tables and figures.
+) -> None:
+    """Run what is not there yet, and write ``searches.csv``; tables and figures are made of it by ``sections``.
 
     Args:
-        folder: Folder of the experiment. ``searches.csv`` holds the logged rows, ``tables`` and ``figures`` what
-            :mod:`benchmarks.optimizer_comparison.analysis` makes of them.
+        folder: Folder of the experiment.
         quick: Small grids, few seeds and small budgets.
         seeds: Searches of each kind, of large budgets at most as many as planned; None for those of the settings.
         workers: See :func:`benchmarks.cells.run_cells`.
         scheduler: See there.
         progress: See there.
         settings: In place of the full or quick ones.
-
-    Returns:
-        The folder of the tables.
 
     Raises:
         CellsFailed: Some cells failed; everything else is finished and on disk.
@@ -58,10 +54,6 @@ def reproduce(
     folder = Path(folder)
     found = run_cells(run_cell, cells_of(settings), folder, workers=workers, scheduler=scheduler, progress=progress)
     write_table(folder / "searches.csv", found.drop(columns=[c for c in found if str(c).split(".")[0] in _SETTINGS]))
-    from benchmarks.optimizer_comparison.analysis import sections
-
-    sections(folder)
-    return folder / "tables"
 
 
 def run_cell(cell: dict[str, Any]) -> Rows:

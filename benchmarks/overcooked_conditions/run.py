@@ -45,11 +45,11 @@ def reproduce(
     progress: Progress = None,
     settings: Settings | None = None,
 ) -> None:
-    """Run what is not there yet, and write result files, tables and figures.
+    """Run what is not there yet, and write result files; tables and figures are made of them by ``sections``.
 
     Args:
         folder: Folder of the experiment. ``layouts.csv``, ``people.csv``, ``readings.csv`` and ``curves.csv`` hold the
-            results, ``tables`` and ``figures`` what :mod:`benchmarks.overcooked_conditions.analysis` makes of them.
+            results.
         quick: Fewer layouts, people and searches.
         seeds: Layouts per condition, each searched anew; None for those of the settings.
         workers: See :func:`benchmarks.cells.run_cells`.
@@ -83,9 +83,6 @@ def reproduce(
     places: Rows = layouts[layouts["table"] == "layout"].to_dict("records")  # type: ignore[assignment]
     run(read_people, reading_cells(settings, places, people), "readings")
     run(learn_people, curve_cells(settings, places, people), "curves")
-    from benchmarks.overcooked_conditions.analysis import sections
-
-    sections(folder)
 
 
 def _recorded_walks() -> int:

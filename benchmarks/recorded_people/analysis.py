@@ -122,13 +122,19 @@ def _kitchens(stages: pd.DataFrame) -> pd.DataFrame:
 
 def spearman(x: Floats, y: Floats) -> float:
     """Spearman's rank correlation, ties averaged; NaN where one side does not vary or there are fewer than three."""
+    return float(spearman_rows(x[None], y[None])[0])
+
+
+def spearman_rows(x: Floats, y: Floats) -> Floats:
+    """``(k,)`` :func:`spearman` of each row of ``x (k, n)`` with that of ``y (k, n)``."""
     from scipy.stats import rankdata
 
-    if len(x) < 3:
-        return float("nan")
-    a, b = (rankdata(values) - (len(values) + 1) / 2 for values in (x, y))
-    spread = float(np.sqrt((a**2).sum() * (b**2).sum()))
-    return float((a * b).sum()) / spread if spread > 0 else float("nan")
+    if x.shape[1] < 3:
+        return np.full(len(x), np.nan)
+    a, b = (rankdata(values, axis=1) - (x.shape[1] + 1) / 2 for values in (x, y))
+    spread = np.sqrt((a**2).sum(axis=1) * (b**2).sum(axis=1))
+    varies = spread > 0
+    return np.where(varies, (a * b).sum(axis=1) / np.where(varies, spread, 1.0), np.nan)
 
 
 def detectable(n: int, power: float = 0.8, alpha: float = 0.05) -> float:
@@ -175,9 +181,10 @@ def correlate(
         accuracy = part["accuracy"].to_numpy()
         skill = part["skill"].to_numpy()
         people, lots = _resampled(hits, walks, score, bootstraps, rng)
-        above = np.array([spearman(score[lot], skill[lot]) for lot in lots])
+        above = spearman_rows(score[lots], skill[lots])
         rho = spearman(score, accuracy)
-        shuffled = np.array([spearman(score, rng.permutation(accuracy)) for _ in range(bootstraps)])
+        orders = np.stack([rng.permutation(accuracy) for _ in range(bootstraps)])
+        shuffled = spearman_rows(np.broadcast_to(score, orders.shape), orders)
         rows.append(
             {
                 "candidate_set": candidate_set,
@@ -185,7 +192,7 @@ def correlate(
                 "places": len(part),
                 "rho": rho,
                 **_interval("people", people),
-                **_interval("places", np.array([spearman(score[lot], accuracy[lot]) for lot in lots])),
+                **_interval("places", spearman_rows(score[lots], accuracy[lots])),
                 "p": float((1 + (np.abs(shuffled) >= abs(rho) - 1e-12).sum()) / (1 + bootstraps)),
                 "rho_skill": spearman(score, _skill(accuracy, candidates)),
                 **_interval("skill", above),
@@ -211,17 +218,21 @@ def _by_person(readings: pd.DataFrame, places: pd.DataFrame, keys: Sequence[str]
 
 def _resampled(
     hits: Floats, walks: Floats, score: Floats, bootstraps: int, rng: np.random.Generator
-) -> tuple[Floats, list[npt.NDArray[np.intp]]]:
-    """Correlations with people drawn anew, and draws of places."""
-    people, lots = np.full(bootstraps, np.nan), []
-    number = hits.shape[1]
+) -> tuple[Floats, npt.NDArray[np.intp]]:
+    """``(bootstraps,)`` correlations with people drawn anew, and ``(bootstraps, places)`` draws of places."""
+    people, number = hits.shape[1], np.empty((bootstraps, hits.shape[1]))
+    lots = np.empty((bootstraps, len(score)), dtype=np.intp)
     for i in range(bootstraps):
-        weights = rng.multinomial(number, np.full(number, 1 / number)).astype(np.float64)
-        count = walks @ weights
-        seen = count > 0
-        people[i] = spearman(score[seen], (hits @ weights)[seen] / count[seen])
-        lots.append(rng.integers(len(score), size=len(score)))
-    return people, lots
+        number[i] = rng.multinomial(people, np.full(people, 1 / people))
+        lots[i] = rng.integers(len(score), size=len(score))
+    right, count = number @ hits.T, number @ walks.T
+    found = np.full(bootstraps, np.nan)
+    # Where nobody drawn was ever at a place, it does not count.
+    for seen in np.unique(count > 0, axis=0):
+        rows = ((count > 0) == seen).all(axis=1)
+        shares = right[np.ix_(rows, seen)] / count[np.ix_(rows, seen)]
+        found[rows] = spearman_rows(np.broadcast_to(score[seen], shares.shape), shares)
+    return found, lots
 
 
 def _centred(values: Floats, groups: pd.Series[Any]) -> Floats:

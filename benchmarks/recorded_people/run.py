@@ -30,7 +30,7 @@ def reproduce(
     progress: Callable[[Event], object] | None = None,
     settings: Settings | None = None,
 ) -> None:
-    """Run what is not there yet, and write ``scores.csv``, ``readings.csv``, tables and figures.
+    """Run what is not there yet, and write ``scores.csv`` and ``readings.csv``; ``sections`` makes tables and figures.
 
     Args:
         folder: Folder of the experiment.
@@ -59,9 +59,6 @@ def reproduce(
     for name, function, cells in parts:
         found = run_cells(function, cells, folder, workers=workers, scheduler=scheduler, progress=progress)
         write_table(folder / f"{name}.csv", found.drop(columns=[c for c in found if str(c).startswith("how.")]))
-    from benchmarks.recorded_people.analysis import sections
-
-    sections(folder)
 
 
 def _walks(cell: dict[str, Any]) -> list[Trajectory]:
