@@ -18,7 +18,8 @@ __all__ = ["sweep"]
 def sweep(file: Path, out: Path | None, workers: int | None, scheduler: str | None, quiet: bool) -> None:
     """Run a grid of workspaces, objectives, emitters and seeds.
 
-    FILE is TOML: `workspaces` (required), `emitters`, `objectives`, `evaluations`, `seeds`, `predictors`, `people`.
+    FILE is TOML: `workspaces` (required), `emitters`, `objectives`, `evaluations`, `seeds`, `predictors`, `people`
+    (the last two also inside a workspace, for it alone).
     Every finished search is kept at once; running the same file again runs only what is missing.
     """
     from benchmarks.cells import CellsFailed

@@ -69,3 +69,8 @@ def slowly(cell: dict[str, Any]) -> dict[str, Any]:
 def not_rows(cell: dict[str, Any]) -> Any:
     """No rows at all."""
     return {"value": np.zeros(3)}
+
+
+def stuck(archive, workspace, rng):
+    """An emitter that fails when asked."""
+    raise RuntimeError("nowhere to go")

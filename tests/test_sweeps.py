@@ -54,6 +54,11 @@ def test_every_combination_is_one_cell() -> None:
         ({"seeds": []}, "empty"),
         ({"predictors": ["crystal-ball"]}, "crystal-ball"),
         ({"people": 3}, "must be a table"),
+        ({"predictors": ["bayesian"], "people": {"walker": "nobody"}}, "people of .*walker must be one of"),
+        (
+            {"workspaces": ["overcooked", "tabletop"], "predictors": ["bayesian"]},
+            "'bayesian', people of workspace 'tabletop' .*reads walks in kitchens",
+        ),
     ],
 )
 def test_what_cannot_be_run_is_named_before_anything_runs(change: dict[str, Any], message: str) -> None:
@@ -97,6 +102,17 @@ def test_predictors_read_people_in_the_best_layouts(tmp_path: Path) -> None:
         assert 0.1 < table[name][0] <= 1
 
 
+def test_workspaces_may_have_readers_of_their_own() -> None:
+    table = {"workspace": "tabletop", "predictors": ["reach-knn"], "people": {"participants": 3}}
+    plan = Sweep.from_dict(SMALL | {"workspaces": [KITCHEN, table], "predictors": ["bayesian"], "seeds": 1})
+    cells = {variant.labels["workspace"]: variant.cell for variant in plan.variants()}
+    assert set(cells) == {"overcooked shape=5x5 prefix=sum", "tabletop"}
+    assert cells["overcooked shape=5x5 prefix=sum"]["predictors"] == ["bayesian"]
+    assert cells["tabletop"]["predictors"] == ["reach-knn"]
+    assert cells["tabletop"]["people"] == {"participants": 3}
+    assert cells["tabletop"]["workspace"] == {"workspace": "tabletop"}
+
+
 def test_the_command_runs_what_is_missing_and_tells_of_failures(tmp_path: Path) -> None:
     file = tmp_path / "small.toml"
     lines = ['workspaces = [{workspace = "overcooked", shape = [5, 5], label = "small"}]', "evaluations = 300"]
@@ -109,10 +125,10 @@ def test_the_command_runs_what_is_missing_and_tells_of_failures(tmp_path: Path) 
     stamp = cell.stat().st_mtime_ns
     assert CliRunner().invoke(main, arguments).exit_code == 0
     assert cell.stat().st_mtime_ns == stamp
-    file.write_text("\n".join([*lines, 'predictors = ["bayesian"]', "people = {walker = 'nobody'}"]))
+    file.write_text("\n".join([lines[0], "evaluations = 3000", 'emitters = ["cell_functions:stuck"]']))
     failed = CliRunner().invoke(main, arguments)
     assert failed.exit_code == 1
     assert "1 of 1 cells failed 2 times" in failed.output
-    assert "walker must be one of" in failed.output
+    assert "nowhere to go" in failed.output
     wrong = CliRunner().invoke(main, ["sweep", str(tmp_path / "none.toml")])
     assert wrong.exit_code == 2

@@ -7,9 +7,13 @@ import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final, NamedTuple, get_args
 
-from legible_envs.workspace import ObjectiveName, make_workspace
+import numpy as np
+
+from legible_envs.workspace import ObjectiveName, Workspace, make_workspace
+from predictors.registry import make_predictor
 
 __all__ = ["Named", "Sweep", "SweepError", "Variant"]
 
@@ -25,6 +29,13 @@ class Named(NamedTuple):
 
     label: str
     settings: dict[str, Any]
+
+
+class Readers(NamedTuple):
+    """Who reads simulated people in the layouts found, and what these people are like."""
+
+    predictors: tuple[str, ...] = ()
+    people: Mapping[str, Any] = MappingProxyType({})
 
 
 class Variant(NamedTuple):
@@ -45,8 +56,8 @@ class Sweep:
         objectives: Names.
         evaluations: Budgets.
         seeds: One search each.
-        predictors: Who reads simulated people in the best layout of every search; none by default.
-        people: ``participants`` (8) and what the workspace's ``simulate`` takes.
+        readers: By label of a workspace, who reads simulated people in the best layout of every search, and what these
+            people are: ``participants`` (8) and what the workspace's ``simulate`` takes.
 
     Example:
         >>> sweep = Sweep.from_dict({"workspaces": [{"workspace": "overcooked", "shape": [5, 5]}], "seeds": 3})
@@ -60,8 +71,7 @@ class Sweep:
     objectives: tuple[str, ...]
     evaluations: tuple[int, ...]
     seeds: tuple[int, ...]
-    predictors: tuple[str, ...] = ()
-    people: Mapping[str, Any] | None = None
+    readers: Mapping[str, Readers]
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Sweep:
@@ -88,10 +98,12 @@ class Sweep:
         Args:
             data: ``workspaces`` (names or mappings with ``workspace``), and optionally ``name``, ``emitters`` (names
                 or mappings with ``emitter``; default ``"improve"``), ``objectives``, ``evaluations``, ``seeds`` (a
-                number of seeds from 0, or a list), ``predictors`` and ``people``. Mappings may have a ``label``.
+                number of seeds from 0, or a list), ``predictors`` and ``people``. Mappings may have a ``label``, those
+                of workspaces ``predictors`` and ``people`` of their own, instead of the sweep's.
 
         Raises:
-            SweepError: Unknown keys, unknown names, settings that a workspace or an emitter refuses.
+            SweepError: Unknown keys, unknown names, settings that a workspace or an emitter refuses, predictors that
+                cannot read the people of a workspace.
         """
         unknown = sorted(set(data) - set(_KEYS))
         if unknown or not data.get("workspaces"):
@@ -100,15 +112,17 @@ class Sweep:
                 + (f"; unknown: {unknown}" if unknown else "; `workspaces` is missing or empty")
             )
         seeds = data.get("seeds", 1)
+        entries, own = _without_readers(data["workspaces"])
+        workspaces = _axis(entries, "workspace")
+        shared = {"predictors": data.get("predictors", []), "people": data.get("people", {})}
         sweep = cls(
             name=str(data.get("name", "sweep")),
-            workspaces=_axis(data["workspaces"], "workspace"),
+            workspaces=workspaces,
             emitters=_axis(data.get("emitters", ["improve"]), "emitter"),
             objectives=tuple(_listed(data.get("objectives", ["legibility"]), str, "objectives")),
             evaluations=tuple(_listed(data.get("evaluations", [100_000]), int, "evaluations")),
             seeds=tuple(range(seeds)) if type(seeds) is int else tuple(_listed(seeds, int, "seeds")),
-            predictors=tuple(_listed(data.get("predictors", []), str, "predictors")),
-            people=data.get("people"),
+            readers={named.label: _readers(shared | one) for named, one in zip(workspaces, own, strict=True)},
         )
         sweep._check()
         return sweep
@@ -131,13 +145,13 @@ class Sweep:
                 "evaluations": evaluations,
                 "seed": seed,
             }
-            if self.predictors:
-                cell |= {"predictors": list(self.predictors), "people": dict(self.people or {})}
+            predictors, people = self.readers[workspace.label]
+            if predictors:
+                cell |= {"predictors": list(predictors), "people": dict(people)}
             yield Variant(labels, cell)
 
     def _check(self) -> None:
         from optimizers import make_archive, make_emitter
-        from predictors.registry import make_predictor
 
         for what, values in (("objectives", self.objectives), ("evaluations", self.evaluations), ("seeds", self.seeds)):
             if not values:
@@ -147,8 +161,6 @@ class Sweep:
             raise SweepError(f"unknown objectives {unknown}; there are {list(get_args(ObjectiveName))}")
         if min(self.evaluations) < 1:
             raise SweepError(f"`evaluations` must be at least 1, got {min(self.evaluations)}")
-        if self.people is not None and not isinstance(self.people, Mapping):
-            raise SweepError(f"`people` must be a table, got {self.people!r}")
         for label, settings in self.workspaces:
             try:
                 workspace = make_workspace(settings)
@@ -161,19 +173,52 @@ class Sweep:
                     )
             except (ValueError, TypeError) as error:
                 raise SweepError(f"workspace {label!r}: {error}") from error
-        for name in self.predictors:
-            _try(f"predictor {name!r}", lambda name=name: make_predictor(name))
+            self._check_readers(label, workspace)
+
+    def _check_readers(self, label: str, workspace: Workspace) -> None:
+        """Let every predictor read one person in one random layout."""
+        predictors, people = self.readers[label]
+        if not predictors:
+            return
+        rng = np.random.default_rng(0)
+        try:
+            walks = workspace.simulate(workspace.sample(1, rng)[0], 1, rng, **_without(people, "participants"))
+        except (ValueError, TypeError, NotImplementedError) as error:
+            raise SweepError(f"people of workspace {label!r}: {error}") from error
+        for name in predictors:
+            predictor = _try(f"predictor {name!r}", lambda name=name: make_predictor(name))
+            _try(
+                f"predictor {name!r}, people of workspace {label!r} (which may have `predictors` of its own)",
+                lambda it=predictor: it.fit(walks).predict_proba(walks[:1]),
+            )
 
 
-def _try(what: str, make: Any) -> None:
+def _try(what: str, make: Any) -> Any:
     try:
-        make()
+        return make()
     except (ValueError, RuntimeError, ImportError) as error:
         raise SweepError(f"{what}: {error}") from error
 
 
 def _without(settings: Mapping[str, Any], key: str) -> dict[str, Any]:
     return {name: value for name, value in settings.items() if name != key}
+
+
+def _without_readers(entries: Any) -> tuple[list[Any], list[dict[str, Any]]]:
+    """Entries of workspaces without ``predictors`` and ``people``, and these."""
+    rest: list[Any] = []
+    readers: list[dict[str, Any]] = []
+    for entry in [entries] if isinstance(entries, str | Mapping) else list(entries):
+        own = dict(entry) if isinstance(entry, Mapping) else {}
+        readers.append({key: own.pop(key) for key in ("predictors", "people") if key in own})
+        rest.append(own if isinstance(entry, Mapping) else entry)
+    return rest, readers
+
+
+def _readers(data: Mapping[str, Any]) -> Readers:
+    if not isinstance(data["people"], Mapping):
+        raise SweepError(f"`people` must be a table, got {data['people']!r}")
+    return Readers(tuple(_listed(data["predictors"], str, "predictors")), dict(data["people"]))
 
 
 def _axis(entries: Any, key: str) -> tuple[Named, ...]:
