@@ -13,6 +13,7 @@ from click.testing import CliRunner
 
 from benchmarks.cli import main
 from benchmarks.sweeps import Sweep, SweepError, run_sweep
+from benchmarks.sweeps.analysis import for_reading
 from legible_envs.workspace import make_workspace
 
 KITCHEN = {"workspace": "overcooked", "shape": [5, 5], "prefix": "sum"}
@@ -100,6 +101,14 @@ def test_predictors_read_people_in_the_best_layouts(tmp_path: Path) -> None:
     table = run_sweep(plan, tmp_path, workers=1)
     for name in ("accuracy.shortest-distance", "accuracy.bayesian"):
         assert 0.1 < table[name][0] <= 1
+
+
+def test_what_was_not_measured_is_a_dash() -> None:
+    settings = {"objective": "legibility", "emitter": "improve", "evaluations": 300}
+    table = pd.DataFrame(
+        [settings | {"workspace": name, "seed": 0, "best": 1.5, "distance": 2.0, "coverage": 0.5} for name in "ab"]
+    ).assign(**{"accuracy.bayesian": [0.75, np.nan]})
+    assert [row["accuracy.bayesian"] for row in for_reading(table)] == ["0.75", "–"]
 
 
 def test_workspaces_may_have_readers_of_their_own() -> None:

@@ -51,7 +51,7 @@ def for_reading(table: pd.DataFrame) -> list[dict[str, str]]:
         row = {name: str(entry[name]) for name in [*varying, "seeds"]}
         for name in shown:
             mean, sd = entry[f"{name}_mean"], entry[f"{name}_sd"]
-            row[name] = f"{mean:.4g}" + ("" if sd != sd else f" ± {sd:.2g}")
+            row[name] = "–" if mean != mean else f"{mean:.4g}" + ("" if sd != sd else f" ± {sd:.2g}")
         rows.append(row)
     return rows
 
