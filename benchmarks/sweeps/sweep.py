@@ -25,10 +25,11 @@ class SweepError(ValueError):
 
 
 class Named(NamedTuple):
-    """One entry of an axis: what tables call it, and its settings."""
+    """One entry of an axis: what tables call it, its settings, and what it has of its own instead of the sweep's."""
 
     label: str
     settings: dict[str, Any]
+    own: Mapping[str, Any] = MappingProxyType({})
 
 
 class Readers(NamedTuple):
@@ -112,8 +113,7 @@ class Sweep:
                 + (f"; unknown: {unknown}" if unknown else "; `workspaces` is missing or empty")
             )
         seeds = data.get("seeds", 1)
-        entries, own = _without_readers(data["workspaces"])
-        workspaces = _axis(entries, "workspace")
+        workspaces = _axis(data["workspaces"], "workspace", own=("predictors", "people"))
         shared = {"predictors": data.get("predictors", []), "people": data.get("people", {})}
         sweep = cls(
             name=str(data.get("name", "sweep")),
@@ -122,7 +122,7 @@ class Sweep:
             objectives=tuple(_listed(data.get("objectives", ["legibility"]), str, "objectives")),
             evaluations=tuple(_listed(data.get("evaluations", [100_000]), int, "evaluations")),
             seeds=tuple(range(seeds)) if type(seeds) is int else tuple(_listed(seeds, int, "seeds")),
-            readers={named.label: _readers(shared | one) for named, one in zip(workspaces, own, strict=True)},
+            readers={named.label: _readers(shared | dict(named.own)) for named in workspaces},
         )
         sweep._check()
         return sweep
@@ -161,19 +161,19 @@ class Sweep:
             raise SweepError(f"unknown objectives {unknown}; there are {list(get_args(ObjectiveName))}")
         if min(self.evaluations) < 1:
             raise SweepError(f"`evaluations` must be at least 1, got {min(self.evaluations)}")
-        for label, settings in self.workspaces:
+        for named in self.workspaces:
             try:
-                workspace = make_workspace(settings)
-                for emitter, options in self.emitters:
+                workspace = make_workspace(named.settings)
+                for emitter in self.emitters:
                     _try(
-                        f"emitter {emitter!r}",
-                        lambda w=workspace, o=options: make_emitter(
+                        f"emitter {emitter.label!r}",
+                        lambda w=workspace, o=emitter.settings: make_emitter(
                             o["emitter"], make_archive(w, seed=0), w, seed=0, options=_without(o, "emitter")
                         ),
                     )
             except (ValueError, TypeError) as error:
-                raise SweepError(f"workspace {label!r}: {error}") from error
-            self._check_readers(label, workspace)
+                raise SweepError(f"workspace {named.label!r}: {error}") from error
+            self._check_readers(named.label, workspace)
 
     def _check_readers(self, label: str, workspace: Workspace) -> None:
         """Let every predictor read one person in one random layout."""
@@ -181,10 +181,8 @@ class Sweep:
         if not predictors:
             return
         rng = np.random.default_rng(0)
-        try:
-            walks = workspace.simulate(workspace.sample(1, rng)[0], 1, rng, **_without(people, "participants"))
-        except (ValueError, TypeError, NotImplementedError) as error:
-            raise SweepError(f"people of workspace {label!r}: {error}") from error
+        genome, settings = workspace.sample(1, rng)[0], _without(people, "participants")
+        walks = _try(f"people of workspace {label!r}", lambda: workspace.simulate(genome, 1, rng, **settings))
         for name in predictors:
             predictor = _try(f"predictor {name!r}", lambda name=name: make_predictor(name))
             _try(
@@ -196,23 +194,12 @@ class Sweep:
 def _try(what: str, make: Any) -> Any:
     try:
         return make()
-    except (ValueError, RuntimeError, ImportError) as error:
+    except (ValueError, TypeError, RuntimeError, ImportError) as error:
         raise SweepError(f"{what}: {error}") from error
 
 
 def _without(settings: Mapping[str, Any], key: str) -> dict[str, Any]:
     return {name: value for name, value in settings.items() if name != key}
-
-
-def _without_readers(entries: Any) -> tuple[list[Any], list[dict[str, Any]]]:
-    """Entries of workspaces without ``predictors`` and ``people``, and these."""
-    rest: list[Any] = []
-    readers: list[dict[str, Any]] = []
-    for entry in [entries] if isinstance(entries, str | Mapping) else list(entries):
-        own = dict(entry) if isinstance(entry, Mapping) else {}
-        readers.append({key: own.pop(key) for key in ("predictors", "people") if key in own})
-        rest.append(own if isinstance(entry, Mapping) else entry)
-    return rest, readers
 
 
 def _readers(data: Mapping[str, Any]) -> Readers:
@@ -221,8 +208,8 @@ def _readers(data: Mapping[str, Any]) -> Readers:
     return Readers(tuple(_listed(data["predictors"], str, "predictors")), dict(data["people"]))
 
 
-def _axis(entries: Any, key: str) -> tuple[Named, ...]:
-    """Entries of an axis: names or mappings, labelled so that tables can tell them apart."""
+def _axis(entries: Any, key: str, own: Sequence[str] = ()) -> tuple[Named, ...]:
+    """Entries of an axis: names or mappings, labelled so that tables can tell them apart; ``own`` are no settings."""
     found = []
     for number, entry in enumerate([entries] if isinstance(entries, str | Mapping) else list(entries), 1):
         settings = {key: entry} if isinstance(entry, str) else dict(entry) if isinstance(entry, Mapping) else {}
@@ -231,7 +218,8 @@ def _axis(entries: Any, key: str) -> tuple[Named, ...]:
                 f"entry {number} of `{key}s` must be a name or a table with the key `{key}`, got {entry!r}"
             )
         label = settings.pop("label", None)
-        found.append(Named(str(label) if label is not None else _label(settings, key), settings))
+        apart = {name: settings.pop(name) for name in own if name in settings}
+        found.append(Named(str(label) if label is not None else _label(settings, key), settings, apart))
     labels = [name.label for name in found]
     repeated = sorted({label for label in labels if labels.count(label) > 1})
     if repeated or not found:
