@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import Any
 
 import gymnasium as gym
@@ -42,15 +43,14 @@ class Windowed:
             self._window = None
 
 
-class Rendered(Windowed):
+class Rendered(Windowed, ABC):
     """``render`` and ``close`` of an environment that can draw itself."""
 
     def render(self) -> Any:
         """Show the scene, as ``render_mode`` says.
 
         Returns:
-            A picture ``(H, W, 3)`` uint8 (``"rgb_array"``), a drawing in text (``"ansi"``), or None: ``"human"`` shows
-            the picture in a window.
+            A picture ``(H, W, 3)`` uint8 (``"rgb_array"``), or None: ``"human"`` shows it in a window.
         """
         if self.render_mode is None:
             spec = self.spec  # type: ignore[attr-defined]
@@ -60,8 +60,6 @@ class Rendered(Windowed):
                 f'initialization, e.g. gym.make("{name}", render_mode="rgb_array")'
             )
             return None
-        if self.render_mode == "ansi":
-            return self._text()
         picture = self._picture()
         return picture if self.render_mode == "rgb_array" else self._show(picture)
 
@@ -69,10 +67,6 @@ class Rendered(Windowed):
         """Close the window, if there is one."""
         self._close_window()
 
+    @abstractmethod
     def _picture(self) -> npt.NDArray[np.uint8]:
         """``(H, W, 3)`` the scene."""
-        raise NotImplementedError
-
-    def _text(self) -> str:
-        """The scene in characters, where ``"ansi"`` is among the render modes."""
-        raise NotImplementedError

@@ -257,8 +257,9 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
 
         return draw_game(self.view())
 
-    def _text(self) -> str:
-        return to_text(self.view())
+    def render(self) -> Any:
+        """See :meth:`.Rendered.render`; with ``"ansi"``, the game drawn in text."""
+        return to_text(self.view()) if self.render_mode == "ansi" else super().render()
 
     # -- kitchens -----------------------------------------------------------------------------------------------------
 
