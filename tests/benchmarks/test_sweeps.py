@@ -1,0 +1,143 @@
+"""Sweeps: a file becomes cells, cells become tables; the same ones on any number of workers."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from click.testing import CliRunner
+
+from benchmarks.cli import main
+from benchmarks.sweeps import Sweep, SweepError, run_sweep
+from benchmarks.sweeps.analysis import for_reading
+from legible_envs.workspace import make_workspace
+
+KITCHEN = {"workspace": "overcooked", "shape": [5, 5], "prefix": "sum"}
+SMALL = {"workspaces": [KITCHEN], "emitters": ["improve", "random"], "evaluations": 400, "seeds": 2}
+
+
+def test_every_combination_is_one_cell() -> None:
+    plan = Sweep.from_dict(
+        {
+            "workspaces": ["overcooked", KITCHEN],
+            "emitters": ["improve", {"emitter": "improve", "fanout": 8, "label": "narrow"}, "random"],
+            "objectives": ["legibility", "efficiency"],
+            "evaluations": [100, 200],
+            "seeds": [3, 5],
+        }
+    )
+    variants = list(plan.variants())
+    assert len(variants) == 2 * 3 * 2 * 2 * 2
+    assert len({json.dumps(variant.cell, sort_keys=True) for variant in variants}) == len(variants)
+    assert {variant.labels["workspace"] for variant in variants} == {"overcooked", "overcooked shape=5x5 prefix=sum"}
+    assert {variant.labels["emitter"] for variant in variants} == {"improve", "narrow", "random"}
+    assert [variant.labels["seed"] for variant in variants[:4]] == [3, 5, 3, 5]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"workspaces": []}, "missing or empty"),
+        ({"grid": 1}, "unknown: \\['grid'\\]"),
+        ({"workspaces": [{"shape": [5, 5]}]}, "key `workspace`"),
+        ({"workspaces": ["kitchen"]}, "kitchen"),
+        ({"workspaces": [{"workspace": "overcooked", "shape": [2, 2]}]}, "workspace 'overcooked shape=2x2'"),
+        ({"workspaces": [KITCHEN, KITCHEN]}, "more than once"),
+        ({"emitters": ["nobody"]}, "emitter 'nobody'"),
+        ({"emitters": [{"emitter": "improve", "speed": 3}]}, "no option speed"),
+        ({"objectives": ["beauty"]}, "unknown objectives"),
+        ({"evaluations": 0}, "at least 1"),
+        ({"evaluations": "many"}, "integers"),
+        ({"seeds": []}, "empty"),
+        ({"predictors": ["crystal-ball"]}, "crystal-ball"),
+        ({"people": 3}, "must be a table"),
+        ({"predictors": ["bayesian"], "people": {"walker": "nobody"}}, "people of .*walker must be one of"),
+        (
+            {"workspaces": ["overcooked", "tabletop"], "predictors": ["bayesian"]},
+            "'bayesian', people of workspace 'tabletop' .*reads walks in kitchens",
+        ),
+    ],
+)
+def test_what_cannot_be_run_is_named_before_anything_runs(change: dict[str, Any], message: str) -> None:
+    with pytest.raises(SweepError, match=message):
+        Sweep.from_dict(SMALL | change)
+
+
+def test_files_are_named_in_errors(tmp_path: Path) -> None:
+    broken = tmp_path / "broken.toml"
+    broken.write_text("seeds = = 3")
+    with pytest.raises(SweepError, match=r"broken\.toml is not TOML"):
+        Sweep.from_toml(broken)
+    broken.write_text("seeds = 3")
+    with pytest.raises(SweepError, match=r"broken\.toml: a sweep needs `workspaces`"):
+        Sweep.from_toml(broken)
+
+
+def test_results_hold_what_was_searched_and_do_not_depend_on_workers(tmp_path: Path) -> None:
+    plan = Sweep.from_dict(SMALL)
+    alone = run_sweep(plan, tmp_path / "a", workers=1)
+    many = run_sweep(plan, tmp_path / "b", workers=2)
+    pd.testing.assert_frame_equal(alone, many)
+    assert alone["seed"].tolist() == [0, 1, 0, 1]
+    workspace = make_workspace(KITCHEN)
+    for row in alone.to_dict("records"):
+        genome = np.array(json.loads(row["best_genome"]), dtype=workspace.genome_dtype)
+        assert workspace.legibility(genome) == row["legibility"] == row["best"]
+        assert workspace.distance(genome) == row["distance"]
+    written = pd.read_csv(tmp_path / "a" / "results.csv")
+    np.testing.assert_allclose(written["best"], alone["best"], rtol=1e-15)
+    summary = pd.read_csv(tmp_path / "a" / "summary.csv")
+    assert summary["seeds"].tolist() == [2, 2]
+    np.testing.assert_allclose(summary["best_mean"][0], alone["best"][:2].mean())
+
+
+def test_predictors_read_people_in_the_best_layouts(tmp_path: Path) -> None:
+    people = {"predictors": ["shortest-distance", "bayesian"], "people": {"participants": 2, "executions": 1}}
+    plan = Sweep.from_dict(SMALL | people | {"emitters": "random", "seeds": 1})
+    table = run_sweep(plan, tmp_path, workers=1)
+    for name in ("accuracy.shortest-distance", "accuracy.bayesian"):
+        assert 0.1 < table[name][0] <= 1
+
+
+def test_what_was_not_measured_is_a_dash() -> None:
+    settings = {"objective": "legibility", "emitter": "improve", "evaluations": 300}
+    table = pd.DataFrame(
+        [settings | {"workspace": name, "seed": 0, "best": 1.5, "distance": 2.0, "coverage": 0.5} for name in "ab"]
+    ).assign(**{"accuracy.bayesian": [0.75, np.nan]})
+    assert [row["accuracy.bayesian"] for row in for_reading(table)] == ["0.75", "–"]
+
+
+def test_workspaces_may_have_readers_of_their_own() -> None:
+    table = {"workspace": "tabletop", "predictors": ["reach-knn"], "people": {"participants": 3}}
+    plan = Sweep.from_dict(SMALL | {"workspaces": [KITCHEN, table], "predictors": ["bayesian"], "seeds": 1})
+    cells = {variant.labels["workspace"]: variant.cell for variant in plan.variants()}
+    assert set(cells) == {"overcooked shape=5x5 prefix=sum", "tabletop"}
+    assert cells["overcooked shape=5x5 prefix=sum"]["predictors"] == ["bayesian"]
+    assert cells["tabletop"]["predictors"] == ["reach-knn"]
+    assert cells["tabletop"]["people"] == {"participants": 3}
+    assert cells["tabletop"]["workspace"] == {"workspace": "tabletop"}
+
+
+def test_the_command_runs_what_is_missing_and_tells_of_failures(tmp_path: Path) -> None:
+    file = tmp_path / "small.toml"
+    lines = ['workspaces = [{workspace = "overcooked", shape = [5, 5], label = "small"}]', "evaluations = 300"]
+    file.write_text("\n".join(lines))
+    arguments = ["sweep", str(file), "--out", str(tmp_path / "out"), "--workers", "1"]
+    first = CliRunner().invoke(main, arguments)
+    assert first.exit_code == 0, first.output
+    assert "small" in first.output
+    cell = next((tmp_path / "out" / "cells").glob("*.json"))
+    stamp = cell.stat().st_mtime_ns
+    assert CliRunner().invoke(main, arguments).exit_code == 0
+    assert cell.stat().st_mtime_ns == stamp
+    file.write_text("\n".join([lines[0], "evaluations = 3000", 'emitters = ["tests.benchmarks.cell_functions:stuck"]']))
+    failed = CliRunner().invoke(main, arguments)
+    assert failed.exit_code == 1
+    assert "1 of 1 cells failed 2 times" in failed.output
+    assert "nowhere to go" in failed.output
+    wrong = CliRunner().invoke(main, ["sweep", str(tmp_path / "none.toml")])
+    assert wrong.exit_code == 2

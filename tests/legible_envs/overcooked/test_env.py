@@ -1,0 +1,534 @@
+"""Every registered environment: Gymnasium's checks, copies, specs, determinism, pictures; and the kitchen's options."""
+
+from __future__ import annotations
+
+import copy
+import json
+import os
+import pickle
+import subprocess
+import sys
+import warnings
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.envs.registration import EnvSpec
+from gymnasium.utils.env_checker import check_env, data_equivalence
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import array_shapes, arrays
+
+import legible_envs  # noqa: F401
+from legible_envs.errors import LayoutError, TaskError
+from legible_envs.overcooked import PAPER_SOUPS, OvercookedLayout, OvercookedWorkspace
+from legible_envs.overcooked.env import OvercookedEnv
+from legible_envs.overcooked.observations import GRID_CHANNELS, NUM_FEATURES
+from legible_envs.overcooked.policies import ScriptedPlayer
+from legible_envs.overcooked.settings import read_layout
+from tests.oracles.kitchen_oracle import any_kitchen
+
+NAME = "LegibleOvercooked-v0"
+IDS = sorted(name for name, spec in gym.registry.items() if str(spec.entry_point).startswith("legible_envs."))
+KITCHEN = """\
+XXTXOXX
+C     D
+X  V  X
+F 1   P
+X     X
+X     P
+XXXSXXX"""
+VARIANTS = [
+    {},
+    {"obs_type": "vector"},
+    {"obs_type": "rgb"},
+    {"virtual_obstacles": "soft", "obstacle_cost": 1.0, "shaping": True},
+    {"shape": (5, 6), "layouts": "random"},
+    {"layouts": {"kind": "random", "split": "test", "num_layouts": 5}},
+    {"layout": KITCHEN, "recipes": [["onion", "fish"]], "cook_time": 0},
+]
+
+
+def each(variants=tuple(VARIANTS)):
+    cases = [pytest.param(NAME, v, id=f"kitchen-{i}") for i, v in enumerate(variants)]
+    return pytest.mark.parametrize(("name", "arguments"), cases + [pytest.param(i, {}, id=i) for i in IDS if i != NAME])
+
+
+def something(env):
+    """An action that changes the picture."""
+    return 0 if isinstance(env.action_space, gym.spaces.Discrete) else env.action_space.high / 2
+
+
+def rollout(env, seed, steps=120):
+    env.action_space.seed(seed)
+    results = [env.reset(seed=seed)]
+    for _ in range(steps):
+        results.append(env.step(env.action_space.sample()))
+        if results[-1][2] or results[-1][3]:
+            results.append(env.reset())
+    return results
+
+
+# -- every id ---------------------------------------------------------------------------------------------
+
+
+def test_kitchen_and_table_are_registered():
+    assert IDS == [NAME, "LegibleTabletop-v0"]
+
+
+@each()
+def test_gymnasium_finds_nothing_wrong(name, arguments):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        env = gym.make(name, **arguments)
+        check_env(env.unwrapped, skip_render_check=True)
+        rollout(env, 0)
+
+
+@each()
+def test_observations_lie_in_their_space(name, arguments):
+    env = gym.make(name, **arguments)
+    for result in rollout(env, 1):
+        assert env.observation_space.contains(result[0])
+
+
+@each()
+def test_same_seed_same_episode(name, arguments):
+    first, second = (rollout(gym.make(name, **arguments), 5) for _ in range(2))
+    assert data_equivalence(first, second, exact=True)
+
+
+@each()
+@pytest.mark.parametrize("copier", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
+def test_copies_go_on_alone(name, arguments, copier):
+    env = gym.make(name, **arguments)
+    rollout(env, 2, steps=30)
+    twin = copier(env)
+    env.action_space.seed(0)
+    actions = [env.action_space.sample() for _ in range(60)]
+    ahead = [env.step(action) for action in actions] + [env.reset()]
+    assert data_equivalence(ahead, [twin.step(action) for action in actions] + [twin.reset()], exact=True)
+
+
+@each(
+    [*VARIANTS, {"layout": OvercookedLayout.from_ascii(KITCHEN)}, {"layouts": [OvercookedLayout.from_ascii(KITCHEN)]}]
+)
+def test_spec_goes_through_json(name, arguments):
+    env = gym.make(name, **arguments)
+    text = env.spec.to_json()
+    json.loads(text)
+    again = gym.make(EnvSpec.from_json(text))
+    assert data_equivalence(rollout(env, 3, 40), rollout(again, 3, 40), exact=True)
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_pictures(name):
+    env = gym.make(name, render_mode="rgb_array")
+    env.reset(seed=0)
+    before = env.render()
+    assert before.dtype == np.uint8
+    assert before.ndim == 3
+    env.step(something(env))
+    after = env.render()
+    assert after.shape == before.shape
+    assert not np.shares_memory(before, after)
+    assert not np.array_equal(before, after)
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_every_render_mode_passes_the_check(name, monkeypatch):
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        env = gym.make(name)
+        monkeypatch.setitem(env.unwrapped.metadata, "render_fps", 1000)
+        check_env(env.unwrapped)
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_window(name, monkeypatch):
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    env = gym.make(name, render_mode="human")
+    env.reset(seed=0)
+    assert env.unwrapped._window is not None
+    env.step(something(env))
+    twin = copy.deepcopy(env)
+    env.close()
+    env.close()
+    twin.close()
+
+
+def test_text():
+    env = gym.make(NAME, render_mode="ansi", layout=KITCHEN)
+    env.reset(seed=0)
+    env.step(2)
+    lines = env.render().split("\n")
+    drawing = KITCHEN.replace("1", " ").split("\n")
+    drawing[3] = "F  >  P"
+    assert lines[:7] == drawing
+    assert "player 1 holds nothing" in lines
+    assert "pot (3,6): empty, waiting" in lines
+    assert any(line.startswith("step 1,") for line in lines)
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_rendering_without_a_mode_warns(name):
+    env = gym.make(name).unwrapped
+    env.reset(seed=0)
+    with pytest.warns(UserWarning, match="render_mode"):
+        assert env.render() is None
+
+
+def test_keys_reach_every_action():
+    keys = gym.make(NAME).get_wrapper_attr("get_keys_to_action")()
+    assert set(keys.values()) == {0, 1, 2, 3, 5}
+    assert keys[(ord("w"),)] == 0
+
+
+@pytest.mark.filterwarnings("ignore:.*matplotlib")
+def test_playable_by_hand(monkeypatch):
+    """``gymnasium.utils.play`` accepts the environment and its keys."""
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    import pygame
+    from gymnasium.utils.play import PlayableGame
+
+    env = gym.make(NAME, render_mode="rgb_array")
+    env.reset(seed=0)
+    game = PlayableGame(env, None)
+    assert (pygame.K_UP,) in gym.make(NAME).unwrapped.get_keys_to_action()
+    assert pygame.K_SPACE in game.relevant_keys
+
+
+# -- importing ---------------------------------------------------------------------------------------------
+
+
+def in_a_new_process(code: str, **environment: str) -> str:
+    result = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        timeout=240,
+        check=False,
+    )
+    assert result.returncode == 0, result.stderr
+    return result.stdout.strip()
+
+
+def test_import_is_light():
+    heavy = ["numba", "ribs", "sklearn", "torch", "pymunk", "pygame", "pandas", "scipy", "networkx"]
+    packages = "legible_envs, legible_envs.overcooked, legible_envs.tabletop"
+    code = f"import sys, {packages}; print([m for m in {heavy} if m in sys.modules])"
+    assert in_a_new_process(code) == "[]"
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_made_without_importing(name):
+    code = f"import gymnasium; print(gymnasium.make('legible_envs:{name}').spec.id)"
+    assert in_a_new_process(code) == name
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_synchronous_vectors(name):
+    envs = gym.make_vec(name, num_envs=2, vectorization_mode="sync")
+    envs.action_space.seed(0)
+    first, _ = envs.reset(seed=[3, 4])
+    for _ in range(30):
+        observations, rewards, *_ = envs.step(envs.action_space.sample())
+    assert observations.shape == (2, *envs.single_observation_space.shape)
+    assert rewards.shape == (2,)
+    alone = gym.make(name)
+    assert np.array_equal(alone.reset(seed=4)[0], first[1])
+
+
+def test_plays_as_plain_python():
+    code = """
+import gymnasium as gym, numpy as np, legible_envs
+from legible_envs.overcooked.policies import ScriptedPlayer
+env = gym.make("LegibleOvercooked-v0", recipes=[["onion"]], cook_time=1)
+envs = gym.make_vec("LegibleOvercooked-v0", num_envs=2, obs_type="vector")
+player = ScriptedPlayer(env, np.random.default_rng(0))
+obs, info = env.reset(seed=0); envs.reset(seed=0)
+over = False
+while not over:
+    obs, _, over, _, info = env.step(player(obs, info))
+    envs.step(np.array([0, 5]))
+print(info["deliveries"])
+"""
+    assert in_a_new_process(code, NUMBA_DISABLE_JIT="1") == "1"
+
+
+# -- kitchens ---------------------------------------------------------------------------------------------
+
+
+def test_kitchens_in_every_form():
+    layout = OvercookedLayout.from_ascii(KITCHEN)
+    workspace = OvercookedWorkspace(shape=(7, 7))
+    genome = workspace.sample(1, np.random.default_rng(0))[0]
+    env = gym.make(NAME)
+    rows = KITCHEN.split("\n")
+    forms = [layout, KITCHEN, rows, tuple(rows), [list(row) for row in rows], np.array([list(row) for row in rows])]
+    for form in forms:
+        assert env.reset(options={"layout": form})[1]["layout_id"] == layout.layout_id
+    assert env.reset(options={"layout": layout.cells})[1]["layout_id"] == OvercookedLayout(layout.cells).layout_id
+    for form in (genome, genome.tolist(), genome.astype(np.int64)):
+        assert env.reset(options={"layout": form})[1]["layout_id"] == workspace.decode(genome).layout_id
+        assert gym.make(NAME, layout=form).unwrapped.layout == workspace.decode(genome)
+
+
+def test_layouts_are_sticky_until_replaced():
+    env = gym.make(NAME)
+    default = env.unwrapped.layout
+    kitchen = OvercookedLayout.from_ascii(KITCHEN)
+    assert env.reset(options={"layout": kitchen})[1]["layout_id"] == kitchen.layout_id
+    assert env.reset()[1]["layout_id"] == kitchen.layout_id
+    env.set_wrapper_attr("layout", default)
+    assert env.step(4)[4]["layout_id"] == kitchen.layout_id
+    assert env.get_wrapper_attr("layout") == default
+    assert env.reset()[1]["layout_id"] == default.layout_id
+    env.reset(options={"layout": kitchen})
+    assert env.reset(options={"layout": None})[1]["layout_id"] == default.layout_id
+
+
+BAD_KITCHENS = {
+    "ragged": (KITCHEN.replace("C     D", "C    D"), r"row 1 has 6 cells", (1, 0)),
+    "symbol": (KITCHEN.replace("F 1", "Q 1"), "row 3, column 0", (3, 0)),
+    "shape": ("XXXXX\nX   X\nXXXXX", r"\(7, 7\)", None),
+    "station": (KITCHEN.replace("T", "X"), "no tomato station", None),
+    "reachable": (
+        KITCHEN.replace("X  V  X\nF 1", "X  V VX\nF 1").replace("C     D", "C    VD"),
+        "row 1, column 6",
+        (1, 6),
+    ),
+    "type": (3.5, "got float", None),
+    "genome": (np.zeros(5, dtype=np.int8), "genome", None),
+}
+
+
+@pytest.mark.parametrize("case", BAD_KITCHENS)
+def test_bad_kitchens_are_named_and_change_nothing(case):
+    bad, message, cell = BAD_KITCHENS[case]
+    env, twin = gym.make(NAME), gym.make(NAME)
+    for e in (env, twin):
+        e.reset(seed=0)
+        e.step(2)
+    with pytest.raises(LayoutError, match=message) as caught:
+        env.reset(options={"layout": bad})
+    assert caught.value.cell == cell
+    with pytest.raises(LayoutError, match=message):
+        env.unwrapped.layout = bad
+    with pytest.raises(LayoutError, match=message):
+        gym.make(NAME, layout=bad)
+    assert data_equivalence(env.step(1), twin.step(1), exact=True)
+    assert env.reset()[1]["layout_id"] == twin.reset()[1]["layout_id"]
+
+
+SCRAPS = st.one_of(st.none(), st.integers(-3, 2**70), st.floats(), st.text("XVTOCFDPS12 ?", max_size=3), st.binary())
+NESTED = st.recursive(
+    SCRAPS, lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(), inner), max_leaves=12
+)
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    st.one_of(
+        NESTED,
+        st.text("XVTOCFDPS12 \n", max_size=60),
+        st.lists(st.text("XTOCFDPS ", min_size=7, max_size=7), min_size=7, max_size=7),
+        arrays(np.int8, array_shapes(max_dims=3, max_side=8)),
+        arrays(np.int8, 32, elements=st.integers(-1, 20)),
+        arrays(np.float64, array_shapes(max_dims=2)),
+    )
+)
+def test_anything_is_a_kitchen_or_a_layout_error(value):
+    try:
+        layout = read_layout(value, (7, 7))
+    except LayoutError:
+        return
+    assert layout.shape == (7, 7)
+
+
+def test_overcooked_ai_layouts_can_be_played():
+    """Cramped Room, as in Overcooked-AI's layout files: two starts, two onion stations, no tomatoes."""
+    layout = OvercookedLayout.from_overcooked_ai("XXPXX\nO  2O\nX1  X\nXDXSX")
+    env = gym.make(NAME, shape=layout.shape, layout=layout, recipes=[["onion"] * 3] * 2)
+    player = ScriptedPlayer(env, np.random.default_rng(0))
+    obs, info = env.reset(seed=0)
+    assert env.unwrapped.valid_goal_names() == ("onion@(1,0)", "onion@(1,4)")
+    over = False
+    while not over:
+        obs, _, over, _, info = env.step(player(obs, info))
+    assert info["deliveries"] == 2
+
+
+def test_unknown_options_and_arguments():
+    env = gym.make(NAME)
+    with pytest.raises(ValueError, match=r"colour.*layout"):
+        env.reset(options={"colour": 3})
+    for arguments in (
+        {"obs_type": "smell"},
+        {"virtual_obstacles": "firm"},
+        {"obstacle_cost": -1},
+        {"obstacle_cost": float("nan")},
+        {"shape": (2, 7)},
+        {"shape": (7, 7, 7)},
+        {"shaping": {"speed": 1}},
+        {"cook_time": -3},
+        {"render_mode": "poem"},
+        {"layouts": "bad"},
+        {"layouts": {"kind": "random", "shape": (5, 5)}},
+        {"layout": KITCHEN, "layouts": "random"},
+    ):
+        with pytest.raises(ValueError, match=r"`|unknown"):
+            OvercookedEnv(**arguments)
+    with pytest.raises(TaskError, match="beetroot"):
+        gym.make(NAME, recipes=[["beetroot"]])
+    env.reset(seed=0)
+    for action in (6, -1, 1.5, "north", None, 2**70, float("nan")):
+        with pytest.raises(ValueError, match=r"0\.\.5"):
+            env.unwrapped.step(action)
+
+
+def test_default_kitchens_are_valid_and_always_the_same():
+    for shape in ((5, 5), (7, 7), (4, 9), (9, 9)):
+        layout = gym.make(NAME, shape=shape).unwrapped.layout
+        assert layout == gym.make(NAME, shape=shape).unwrapped.layout
+        workspace = OvercookedWorkspace(shape=shape)
+        assert workspace.valid(workspace.encode(layout)[None]).all()
+
+
+# -- the game ---------------------------------------------------------------------------------------------
+
+
+def test_an_episode_delivers_everything_once():
+    env = gym.make(NAME)
+    player = ScriptedPlayer(env, np.random.default_rng(0))
+    obs, info = env.reset(seed=0)
+    total, over = 0.0, False
+    while not over:
+        assert len(env.unwrapped.view().orders) == 3 - info["deliveries"]
+        obs, reward, over, truncated, info = env.step(player(obs, info))
+        total += reward
+        assert not truncated
+    assert total == 60.0
+    assert sorted(env.unwrapped.view().delivered) == sorted(PAPER_SOUPS)
+    assert not info["valid_goals"].any()
+
+
+def test_truncation():
+    env = gym.make(NAME)
+    env.reset(seed=0)
+    for step in range(1, 1201):
+        assert env.step(4)[3] == (step == 1200)
+
+
+def test_soft_obstacles_count_and_cost():
+    layout = KITCHEN.replace("F 1   P", "F 1V  P")
+    env = gym.make(NAME, layout=layout, virtual_obstacles="soft", obstacle_cost=0.25)
+    env.reset()
+    assert env.step(2)[1] == -0.25
+    assert env.step(4)[1] == 0.0
+    _, reward, _, _, info = env.step(0)
+    assert reward == -0.25
+    assert info["crossings"] == 2
+    hard = gym.make(NAME, layout=layout, obstacle_cost=0.25)
+    hard.reset()
+    assert hard.step(2)[1] == 0.0
+    assert hard.unwrapped.view().players[0].cell == (3, 2)
+
+
+def test_shaping_pays_for_each_stage():
+    def total(shaping):
+        env = gym.make(NAME, shaping=shaping)
+        player = ScriptedPlayer(env, np.random.default_rng(0))
+        obs, info = env.reset(seed=0)
+        over, rewards = False, 0.0
+        while not over:
+            obs, reward, over, _, info = env.step(player(obs, info))
+            rewards += reward
+        return rewards
+
+    assert total(True) == 60 + 9 * 3 + 3 * 3 + 3 * 5
+    assert total({"dish": 0.5}) == 60 + 3 * 0.5
+    assert total(False) == 60
+
+
+def test_two_games_with_different_recipes_side_by_side():
+    fish, onion = (gym.make(NAME, recipes=[[kind]], layout=KITCHEN) for kind in ("fish", "onion"))
+    fish.reset(seed=0)
+    onion.reset(seed=0)
+    assert fish.unwrapped.valid_goal_names() == ("fish",)
+    assert onion.unwrapped.valid_goal_names() == ("onion",)
+    fish.step(1)
+    assert onion.unwrapped.valid_goal_names() == ("onion",)
+
+
+def test_grid_shows_what_the_view_says():
+    rng = np.random.default_rng(4)
+    for _ in range(5):
+        layout = any_kitchen(rng)
+        env = gym.make(NAME, shape=layout.shape, layout=layout, cook_time=5)
+        player = ScriptedPlayer(env, rng)
+        obs, info = env.reset()
+        for _ in range(150):
+            action = player(obs, info) if rng.random() < 0.8 else int(rng.integers(6))
+            obs, _, over, _, info = env.step(action)
+            np.testing.assert_array_equal(obs, expected_grid(env.unwrapped.view()))
+            if over:
+                break
+
+
+def expected_grid(view):
+    names = list(GRID_CHANNELS)
+    grid = np.zeros((*view.layout.shape, len(names) + len(view.orders) + len(view.delivered)), dtype=np.uint8)
+
+    def show(cell, item):
+        if item is not None:
+            for kind in item.contents if item.kind == "soup" else [item.kind]:
+                grid[(*cell, ["tomato", "onion", "cabbage", "fish", "dish"].index(kind) + 14)] += 1
+            if item.kind == "soup":
+                grid[(*cell, names.index("dish"))] = 1
+                grid[(*cell, names.index("soup"))] = 1
+
+    grid[..., :9] = view.layout.cells[..., None] == np.arange(1, 10)
+    for player in view.players:
+        grid[(*player.cell, 9)] = grid[(*player.cell, 10 + player.facing)] = 1
+        show(player.cell, player.held)
+    for cell, item in view.counters.items():
+        show(cell, item)
+    for cell, pot in view.pots.items():
+        for kind in pot.contents:
+            grid[(*cell, 14 + ["tomato", "onion", "cabbage", "fish"].index(kind))] += 1
+        grid[(*cell, 20)], grid[(*cell, 21)] = pot.ticks, pot.is_ready
+    open_orders = list(view.orders)
+    for number, recipe in enumerate(PAPER_SOUPS):
+        grid[..., 22 + number] = recipe in open_orders
+    return grid
+
+
+def test_vector_says_where_things_are():
+    env = gym.make(NAME, layout=KITCHEN, obs_type="vector")
+    obs, _ = env.reset()
+    assert obs.shape == (NUM_FEATURES + 3,)
+    np.testing.assert_allclose(obs[:2], [3 / 6, 2 / 6])
+    assert obs[2:6].tolist() == [1, 0, 0, 0]
+    assert obs[6:13].tolist() == [1, 0, 0, 0, 0, 0, 0]
+    assert obs[13:17].tolist() == [1, 1, 1, 1]
+    tomato, pot = obs[17:20], obs[32:35]
+    np.testing.assert_allclose(tomato, [-3 / 6, 0, 2 / 49], rtol=1e-6)
+    np.testing.assert_allclose(pot, [0, 4 / 6, 3 / 49], rtol=1e-6)
+    assert obs[38:51].tolist() == [0] * 13
+    assert obs[51:].tolist() == [1, 1, 1]
+    player = ScriptedPlayer(env, np.random.default_rng(0))
+    info, over, ready = env.reset()[1], False, 0.0
+    while not over:
+        obs, _, over, _, info = env.step(player(obs, info))
+        view = env.unwrapped.view()
+        ready += obs[44]
+        assert obs[44] == any(p.is_ready for p in view.pots.values())
+        assert obs[43] == np.float32(max(p.ticks for p in view.pots.values()) / 20)
+        loose = [kind for p in view.pots.values() if not (p.is_cooking or p.is_ready) for kind in p.contents]
+        counts = [min(loose.count(kind) / 3, 1) for kind in ("tomato", "onion", "cabbage", "fish")]
+        np.testing.assert_allclose(obs[38:42], counts, rtol=1e-6)
+        assert obs[51:].sum() == len(view.orders)
+    assert ready > 0

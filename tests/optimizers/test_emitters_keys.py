@@ -1,0 +1,96 @@
+"""Random keys: every vector is a valid layout, every valid layout has a vector."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from legible_envs.overcooked import OvercookedWorkspace
+from optimizers.emitters.random_keys import BoundedKeys, KitchenKeys, random_keys
+from tests.support.shelf_workspace import ShelfWorkspace
+
+SHELF = ShelfWorkspace()
+KITCHENS = [
+    OvercookedWorkspace(shape=(5, 5)),
+    OvercookedWorkspace(shape=(5, 9), distinct_access=True, locked={"pot": (0, 3)}, forbidden=[(2, 2), (4, 4)]),
+    OvercookedWorkspace(shape=(9, 9)),
+]
+
+
+@pytest.mark.parametrize("workspace", KITCHENS, ids=["5x5", "5x9-ruled", "9x9"])
+def test_kitchens_and_keys_there_and_back(workspace):
+    keys = random_keys(workspace)
+    assert isinstance(keys, KitchenKeys)
+    rng = np.random.default_rng(0)
+    genomes = workspace.sample(300, rng)
+    encoded = keys.encode(genomes)
+    assert ((encoded > 0) & (encoded < 1)).all()
+    np.testing.assert_array_equal(keys.decode(encoded, genomes, rng), genomes)
+    anything = np.concatenate([rng.random((300, keys.size)), rng.normal(0.5, 3.0, (300, keys.size))])
+    decoded = keys.decode(anything, genomes, rng)
+    assert decoded.dtype == workspace.genome_dtype
+    assert workspace.valid(decoded).all()
+    np.testing.assert_array_equal(decoded, keys.decode(anything, genomes[::-1], np.random.default_rng(9)))
+
+
+def literal_kitchen(workspace, keys):
+    """The decoder's rules as sentences: the nearest place that leaves room, then obstacles in descending order."""
+    stations, slots = len(workspace.stations), len(workspace.rules.slots)
+    allowed, compatible = workspace.rules.geometry.allowed, workspace.rules.geometry.compatible
+
+    def place(chosen):
+        i = len(chosen)
+        if i == stations:
+            return chosen
+        at = keys[i] * slots - 0.5
+        ring = sorted(range(slots), key=lambda s: min(abs(s - at), slots - abs(s - at)))
+        for slot in ring:
+            if allowed[i, slot] and all(compatible[slot, other] for other in chosen):
+                found = place([*chosen, slot])
+                if found:
+                    return found
+        return None
+
+    genome = np.zeros(workspace.genome_size, dtype=np.int8)
+    genome[:stations] = place([])
+    for cell in sorted(range(len(keys) - stations), key=lambda cell: -keys[stations + cell]):
+        if keys[stations + cell] > 0.5:
+            genome[stations + cell] = 1
+            genome[stations + cell] = workspace.valid(genome[None])[0]
+    return genome
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.sampled_from([KITCHENS[0], KITCHENS[2]]))
+def test_the_kernel_reads_kitchens_as_its_rules_say(seed, workspace):
+    keys = np.random.default_rng(seed).random((1, workspace.genome_size))
+    decoded = random_keys(workspace).decode(keys, np.zeros((1, 0)), np.random.default_rng(0))
+    np.testing.assert_array_equal(decoded[0], literal_kitchen(workspace, keys[0]))
+
+
+def test_keys_of_any_workspace_are_its_genes_and_are_repaired_with_the_anchor():
+    keys = random_keys(SHELF)
+    assert isinstance(keys, BoundedKeys)
+    genomes = SHELF.all_genomes()
+    np.testing.assert_array_equal(keys.decode(keys.encode(genomes), genomes, np.random.default_rng(0)), genomes)
+    raw = np.random.default_rng(1).normal(0.5, 1.0, (400, SHELF.genome_size))
+    anchors = SHELF.sample(400, np.random.default_rng(2))
+    decoded = keys.decode(raw, anchors, np.random.default_rng(3))
+    assert SHELF.valid(decoded).all()
+    # Every gene is the key's or the anchor's, and genes that were fine alone are mostly the key's.
+    own = np.clip(np.floor(np.clip(raw, 0, 1) * (SHELF.upper_bounds + 1.0)), 0, SHELF.upper_bounds)
+    assert ((decoded == own) | (decoded == anchors)).all()
+    assert (decoded == own).mean() > 0.6
+
+
+class Hopeless(ShelfWorkspace):
+    """Only one layout is valid."""
+
+    def valid(self, genomes):
+        return (np.asarray(genomes) == [0, 1, 2, 0, 0, 0]).all(axis=1)
+
+
+def test_repair_ends_at_the_anchor():
+    anchors = np.tile(np.array([[0, 1, 2, 0, 0, 0]], dtype=np.int8), (50, 1))
+    decoded = BoundedKeys(Hopeless()).decode(np.full((50, 6), 0.9), anchors, np.random.default_rng(0))
+    np.testing.assert_array_equal(decoded, anchors)
