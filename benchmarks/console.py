@@ -10,11 +10,10 @@ if TYPE_CHECKING:
     from rich.table import Table
     from rich.text import Text
 
-    from benchmarks.report import Condition
     from legible_envs.overcooked.layout import OvercookedLayout
     from legible_envs.tabletop import TabletopLayout
 
-__all__ = ["board", "board_for", "boards", "number", "say", "table", "table_text"]
+__all__ = ["board", "board_for", "number", "say", "table", "table_text"]
 
 _PLAIN = {"X": "##", "V": "[]", " ": "  "}
 _FANCY = {"X": "▒▒", "V": "[]", " ": "  "}
@@ -129,23 +128,6 @@ def _along(at: tuple[float, float], angle: float, length: float) -> list[tuple[f
     count = max(2, round(length / 0.01))
     steps = [length * (i / (count - 1) - 0.5) for i in range(count)]
     return [(at[0] + s * math.cos(angle), at[1] + s * math.sin(angle)) for s in steps]
-
-
-def boards(console: Console, conditions: Sequence[Condition]) -> Table:
-    """Kitchens side by side, each over its name, its scores and how it was chosen."""
-    from rich.table import Table
-    from rich.text import Text
-
-    grid = Table.grid(padding=(0, 4))
-    for _ in conditions:
-        grid.add_column(max_width=32)
-    grid.add_row(*(board_for(console, c.layout) for c in conditions))
-    grid.add_row()
-    grid.add_row(*(Text(c.name, style="bold") for c in conditions))
-    grid.add_row(*(f"legibility [bold cyan]{number(c.score)}[/]" for c in conditions))
-    grid.add_row(*(f"distance   [bold]{number(c.distance, 1)}[/]" for c in conditions))
-    grid.add_row(*(Text(c.note, style="dim") for c in conditions))
-    return grid
 
 
 def table(rows: Sequence[dict[str, Any]]) -> Table:

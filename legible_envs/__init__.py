@@ -3,10 +3,32 @@
 Importing the package registers its environments: ``gymnasium.make("LegibleOvercooked-v0")``.
 """
 
-from legible_envs.errors import LayoutError, TaskError
-from legible_envs.registration import register_environments
+from gymnasium.envs.registration import register, registry
 
-__all__ = ["LayoutError", "TaskError", "__version__"]
+from legible_envs.errors import LayoutError, TaskError
+
+__all__ = ["LayoutError", "TaskError", "__version__", "register_environments"]
 __version__ = "0.1.0"
+
+
+def register_environments() -> None:
+    """Register every environment of this package; doing so again changes nothing.
+
+    Entry points are strings, so that specs stay JSON and nothing heavy is imported.
+    """
+    if "LegibleOvercooked-v0" not in registry:
+        register(
+            id="LegibleOvercooked-v0",
+            entry_point="legible_envs.overcooked.env:OvercookedEnv",
+            vector_entry_point="legible_envs.overcooked.vector_env:OvercookedVectorEnv",
+            max_episode_steps=1200,
+        )
+    if "LegibleTabletop-v0" not in registry:
+        register(
+            id="LegibleTabletop-v0",
+            entry_point="legible_envs.tabletop.env:TabletopEnv",
+            max_episode_steps=1800,
+        )
+
 
 register_environments()

@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from legible_envs.plugins import Registry
+from legible_envs.support.plugins import Registry
 
 if TYPE_CHECKING:
-    from legible_envs.rollouts import Trajectory
+    from legible_envs.rollouts.trajectory import Trajectory
     from legible_envs.workspace_checks import check_workspace
 
 __all__ = ["Objective", "ObjectiveName", "Workspace", "check_workspace", "make_workspace", "register_workspace"]
@@ -289,8 +289,8 @@ _registry = Registry(
     "workspace",
     "legible.workspaces",
     {
-        "overcooked": "legible_envs.overcooked.workspace:OvercookedWorkspace",
-        "tabletop": "legible_envs.tabletop.workspace:TabletopWorkspace",
+        "overcooked": "legible_envs.overcooked.design.workspace:OvercookedWorkspace",
+        "tabletop": "legible_envs.tabletop.design.workspace:TabletopWorkspace",
     },
     ValueError,
 )

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from ribs.archives import GridArchive
 
-from legible_envs.files import write_npz
+from legible_envs.support.files import write_npz
 
 if TYPE_CHECKING:
     from ribs.archives import ArchiveBase

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from optimizers.result import SearchResult
+    from optimizers.runs.result import SearchResult
 
 __all__ = ["CheckpointError", "EmitterError", "SearchError", "SearchInterrupted"]
 

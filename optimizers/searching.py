@@ -15,11 +15,11 @@ import numpy as np
 
 from optimizers.emitters.registry import EmitterSpec
 from optimizers.errors import SearchInterrupted
-from optimizers.evaluate import Evaluator, Objective
+from optimizers.evaluator import Evaluator, Objective
 from optimizers.progress import Progress
-from optimizers.result import SearchResult
-from optimizers.run import Run, SearchState
-from optimizers.run_folder import RunFolder
+from optimizers.runs.folder import RunFolder
+from optimizers.runs.result import SearchResult
+from optimizers.search_run import Run, SearchState
 
 __all__ = ["Callback", "SearchState", "search"]
 
@@ -70,7 +70,7 @@ def search(
         initial: Random layouts scored first (20 % obstacles in a kitchen). ``iterations`` overrides it.
         max_distance: Layouts with a longer expected walk are not allowed.
         emitter_options: Keyword arguments of the emitter, or one mapping per emitter.
-        checkpoint: Folder of the run; everything in :mod:`optimizers.run_folder` is written there. None writes nothing.
+        checkpoint: Folder of the run; everything in :mod:`.folder` is written there. None writes nothing.
         resume: True continues the run in that folder and fails if there is none; ``"auto"`` begins one if there is
             none. ``evaluations`` may have grown, everything else must be as it was; the emitters go on with the
             defaults they derived from the first budget.

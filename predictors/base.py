@@ -20,9 +20,9 @@ import numpy.typing as npt
 from sklearn.base import BaseEstimator
 from sklearn.exceptions import NotFittedError
 
-from legible_envs.rollouts import Cut, Trajectory
+from legible_envs.rollouts.trajectory import Cut, Trajectory
 
-__all__ = ["FRACTIONS", "TIE_TOLERANCE", "GoalPredictor", "GoalStream", "Ties", "correctness"]
+__all__ = ["FRACTIONS", "TIE_TOLERANCE", "GoalPredictor", "GoalStream", "NoReader", "Ties", "correctness"]
 
 Ties = Literal["fractional", "strict"]
 
@@ -290,3 +290,20 @@ class GoalStream:
             complete=False,
             goal_positions=part.goal_positions,
         )
+
+
+class NoReader:
+    """Believes in every valid goal alike, whatever it sees: a predictor in the sense of ``ReachWatcher``."""
+
+    def stream(self, context: Any) -> _Uniform:
+        """The belief about one reach; ``context.candidates`` are the goals."""
+        return _Uniform(context.candidates)
+
+
+class _Uniform:
+    def __init__(self, goals: Sequence[str]) -> None:
+        self.belief = {goal: 1 / len(goals) for goal in goals}
+
+    def update(self, point: Any, time: float | None = None) -> dict[str, float]:
+        """The same, whatever was seen."""
+        return dict(self.belief)

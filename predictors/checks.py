@@ -10,7 +10,7 @@ import numpy as np
 from sklearn.base import clone
 
 from legible_envs.overcooked.layout import OvercookedLayout
-from legible_envs.rollouts import Trajectory
+from legible_envs.rollouts.trajectory import Trajectory
 from predictors.base import GoalPredictor
 
 __all__ = ["example_walks", "find_problems"]

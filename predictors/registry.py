@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, Final
 
-from legible_envs.plugins import Plugin, Registry
-from legible_envs.rollouts import Trajectory
+from legible_envs.rollouts.trajectory import Trajectory
+from legible_envs.support.plugins import Plugin, Registry
 from predictors.base import GoalPredictor
 
 __all__ = [
@@ -38,17 +38,17 @@ _registry = Registry(
     ENTRY_POINT_GROUP,
     {
         "bayesian": "predictors.grid.bayesian:BayesianGoalPredictor",
-        "grid-knn": "predictors.grid.knn:GridNeighbours",
-        "grid-logistic": "predictors.grid.logistic:GridLogistic",
-        "grid-ngram": "predictors.grid.ngram:GridNGram",
+        "grid-knn": "predictors.grid.baselines:GridNeighbours",
+        "grid-logistic": "predictors.grid.baselines:GridLogistic",
+        "grid-ngram": "predictors.grid.baselines:GridNGram",
         "maxent-irl": "predictors.grid.maxent_irl:MaxEntIRL",
         "reach-bayesian": "predictors.reaching.bayesian:StraightLineBayesian",
         "reach-gaussian": "predictors.reaching.gaussian:TimeSeriesGaussian",
         "reach-knn": "predictors.reaching.baselines:ReachNeighbours",
         "reach-logistic": "predictors.reaching.baselines:ReachLogistic",
-        "recurrent": "predictors.neural.recurrent:RecurrentPredictor",
+        "recurrent": "predictors.neural.models:RecurrentPredictor",
         "shortest-distance": "predictors.grid.shortest_distance:ShortestDistance",
-        "transformer": "predictors.neural.transformer:TransformerPredictor",
+        "transformer": "predictors.neural.models:TransformerPredictor",
     },
     PredictorError,
 )

@@ -48,7 +48,7 @@ def test_pictures_and_links_are_there(page):
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_command_lines_name_commands_that_exist(page):
-    from benchmarks.cli import main
+    from benchmarks.cli.app import main
 
     text = "\n".join(blocks(page, "console"))
     named = set(re.findall(r"^\$ legible (\w+)", text, re.MULTILINE))

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from benchmarks.cells import CellStore
 from benchmarks.sweeps.sweep import Sweep
-from legible_envs.files import write_atomically
+from benchmarks.trials import CellStore
+from legible_envs.support.files import write_atomically
 
 if TYPE_CHECKING:
     import pandas as pd

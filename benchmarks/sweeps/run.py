@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from benchmarks.cells import CellsFailed, Event, run_cells
 from benchmarks.sweeps.analysis import CELL_FUNCTION, write_tables
 from benchmarks.sweeps.sweep import Sweep
+from benchmarks.trials import CellsFailed, Event, run_cells
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -31,7 +31,7 @@ def run_sweep(
 
     Args:
         sweep: What to run.
-        folder: Where results are kept; see :func:`benchmarks.cells.run_cells`.
+        folder: Where results are kept; see :func:`benchmarks.trials.run_cells`.
         workers: Processes on this machine; all cores if None.
         scheduler: Address of a Dask scheduler instead.
         progress: Called whenever something changes.
@@ -89,7 +89,7 @@ def _read_people(workspace: Any, genome: Any, cell: Mapping[str, Any]) -> dict[s
     """Mean accuracy over 10 to 90 % observed of each predictor on people simulated in the best layout."""
     if not cell.get("predictors"):
         return {}
-    from predictors.evaluation import evaluate
+    from predictors.evaluation.cross_validation import evaluate
 
     settings = dict(cell["people"])
     participants = int(settings.pop("participants", 8))

@@ -1,7 +1,7 @@
 """Runs in the environment of imitation or irl-maxent, on the problem in the file named second.
 
 To "rate SECONDS" it answers with gradients per second, to "gradient" with the gradient itself. The problem, made by
-:func:`benchmarks.throughput.reading.save_problem`: ``next`` ``(n, 4)`` cells beside each cell (-1: none), ``goals``
+:func:`.save_problem`: ``next`` ``(n, 4)`` cells beside each cell (-1: none), ``goals``
 ``(n, 4, K)`` whether that move enters a station, ``starts`` ``(K, n)`` how many walks to each station begin where,
 ``visits`` ``(n,)`` how often cells were entered or begun in, ``rewards`` ``(n,)`` of the cells, ``horizon`` after how
 many steps walks end at the latest (imitation needs such a limit). Both packages know one task at a time: there is one

@@ -16,10 +16,10 @@ import numpy as np
 from benchmarks.throughput.analysis import machine, result_table, to_markdown
 from benchmarks.throughput.measure import Figure, alternate, rate
 from benchmarks.throughput.peers import IMITATION, IRL_MAXENT, OVERCOOKED_AI, Peer, opened
-from benchmarks.throughput.reaching import reaches
-from benchmarks.throughput.reading import evaluating, reading, save_problem
+from benchmarks.throughput.predictors_grid import evaluating, reading, save_problem
+from benchmarks.throughput.predictors_reaching import reaches
 from benchmarks.throughput.sweep import FULL, OPTIMUM_5X5, QUICK, Settings
-from benchmarks.throughput.tables import table_drawing, table_games, table_people, table_scoring, table_searching
+from benchmarks.throughput.tabletop import table_drawing, table_games, table_people, table_scoring, table_searching
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -105,8 +105,8 @@ def _busy() -> list[str]:
 
 def scoring(settings: Settings) -> list[Figure]:
     """Exact scores per second on one core, and how many times faster that is than the readable definition."""
-    from legible_envs.overcooked.scoring import score_layout
-    from legible_envs.overcooked.workspace import OvercookedWorkspace
+    from legible_envs.overcooked.design.workspace import OvercookedWorkspace
+    from legible_envs.overcooked.scoring.explanation import score_layout
 
     samplers: dict[str, Callable[[], float]] = {}
     for shape in settings.shapes:
@@ -150,7 +150,7 @@ def _scorer(workspace: Any, genomes: Any, seconds: float) -> Callable[[], float]
 
 def searching(settings: Settings) -> list[Figure]:
     """Time to the known optimum of 5x5 kitchens, and the share of a search's time that is not scoring."""
-    from legible_envs.overcooked.workspace import OvercookedWorkspace
+    from legible_envs.overcooked.design.workspace import OvercookedWorkspace
     from optimizers import search
 
     small = OvercookedWorkspace(shape=(5, 5), prefix="sum")
@@ -186,7 +186,7 @@ def games(settings: Settings, peer: Peer | None = None) -> list[Figure]:
     import gymnasium as gym
 
     import legible_envs  # noqa: F401  (registers)
-    from legible_envs.overcooked.workspace import OvercookedWorkspace
+    from legible_envs.overcooked.design.workspace import OvercookedWorkspace
 
     rng = np.random.default_rng(0)
     workspace = OvercookedWorkspace()

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from legible_envs.drawing.canvas import Image, Sprite, paste, rgb, text_sprite
 from legible_envs.drawing.palette import PAGE
-from legible_envs.files import write_atomically
+from legible_envs.support.files import write_atomically
 
 __all__ = ["banner", "check_tile", "draw_side_by_side", "fit_text", "overlay", "save_png"]
 

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from legible_envs.overcooked.env import OvercookedEnv
+from legible_envs.overcooked.game.snapshot import name_goals
+from legible_envs.overcooked.game.vectors import Kitchen, Vector
+from legible_envs.overcooked.game.view import GameView
 from legible_envs.overcooked.layout import OvercookedLayout
-from legible_envs.overcooked.snapshot import name_goals
-from legible_envs.overcooked.vectors import Kitchen, Vector
-from legible_envs.overcooked.view import GameView
 
 if TYPE_CHECKING:
     from legible_envs.overcooked.vector_env import OvercookedVectorEnv

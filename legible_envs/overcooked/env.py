@@ -11,15 +11,17 @@ import numpy.typing as npt
 from gymnasium import spaces
 
 from legible_envs.drawing.rendered import Rendered
-from legible_envs.overcooked import batch
+from legible_envs.overcooked.game import batch
+from legible_envs.overcooked.game.observations import grid_observation, vector_observation
+from legible_envs.overcooked.game.snapshot import make_view, name_goals, to_text
+from legible_envs.overcooked.game.vectors import CROSSINGS, DELIVERIES, STATE_SIZE, Kitchen, Vector
+from legible_envs.overcooked.game.view import GameView
 from legible_envs.overcooked.layout import OvercookedLayout
-from legible_envs.overcooked.observations import grid_observation, vector_observation
+from legible_envs.overcooked.layouts import read_layout
 from legible_envs.overcooked.recipes import PAPER_SOUPS
-from legible_envs.overcooked.settings import KitchenSettings, PackedKitchen, read_layout
-from legible_envs.overcooked.snapshot import draw_small, make_view, name_goals, to_text
-from legible_envs.overcooked.vectors import CROSSINGS, DELIVERIES, STATE_SIZE, Kitchen, Vector
-from legible_envs.overcooked.view import GameView
-from legible_envs.specs import JsonSpec, check_options
+from legible_envs.overcooked.rendering.board import draw_small
+from legible_envs.overcooked.settings import KitchenSettings, PackedKitchen
+from legible_envs.support.specs import JsonSpec, check_options
 
 __all__ = ["OvercookedEnv"]
 

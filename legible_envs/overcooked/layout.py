@@ -47,7 +47,7 @@ class OvercookedLayout:
 
     A value: immutable, hashable, compared by content. It admits every kitchen that can be drawn (stations may repeat,
     stand inside the room and have several access cells); the design rules of a search belong to
-    :class:`~legible_envs.overcooked.workspace.OvercookedWorkspace`.
+    :class:`~legible_envs.overcooked.design.workspace.OvercookedWorkspace`.
 
     ASCII: ``X`` counter, space floor, ``V`` virtual obstacle, ``T O C F D P S`` tomato, onion, cabbage, fish, dish, pot
     and serving stations, ``1`` to ``9`` the players' starts (floor underneath).

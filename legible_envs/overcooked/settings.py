@@ -10,93 +10,22 @@ import numpy.typing as npt
 from gymnasium import spaces
 
 from legible_envs.errors import LayoutError
-from legible_envs.overcooked.distribution import LayoutDistribution, default_layout, read_distribution
-from legible_envs.overcooked.goals import missing_station
+from legible_envs.overcooked.game.goals import missing_station
+from legible_envs.overcooked.game.observations import GRID_CHANNELS, NUM_FEATURES, find_routes
+from legible_envs.overcooked.game.rules import GameRules, pack_kitchen, pack_rules
+from legible_envs.overcooked.game.vectors import POT_CELL, Kitchen, Vector
 from legible_envs.overcooked.layout import INGREDIENTS, STATION_TYPES, OvercookedLayout
-from legible_envs.overcooked.observations import GRID_CHANNELS, NUM_FEATURES, find_routes
+from legible_envs.overcooked.layouts import LayoutDistribution, default_layout, read_distribution, read_layout
 from legible_envs.overcooked.recipes import PAPER_SOUPS
-from legible_envs.overcooked.rules import GameRules, pack_kitchen, pack_rules
-from legible_envs.overcooked.snapshot import RGB_TILE
-from legible_envs.overcooked.vectors import POT_CELL, Kitchen, Vector
+from legible_envs.overcooked.rendering.board import RGB_TILE
 
-__all__ = [
-    "OBS_TYPES",
-    "SHAPING",
-    "KitchenSettings",
-    "PackedKitchen",
-    "count_pots",
-    "read_layout",
-]
+__all__ = ["OBS_TYPES", "SHAPING", "KitchenSettings", "PackedKitchen", "count_pots"]
 
 OBS_TYPES: Final = ("grid", "vector", "rgb")
 SHAPING: Final[Mapping[str, float]] = {"ingredient": 3.0, "dish": 3.0, "soup": 5.0}
 """Rewards of ``shaping=True``: an ingredient put in a pot, a dish fetched in need, a soup taken."""
 
 DELIVERY_REWARD: Final = 20.0
-
-
-def read_layout(value: Any, shape: tuple[int, int]) -> OvercookedLayout:
-    """Turn whatever describes a kitchen into one of the given shape.
-
-    Args:
-        value: An :class:`OvercookedLayout`, an ASCII drawing, a list of row strings, nested lists of symbols, a 2-D
-            array of cell codes, or a genome (1-D integers) of ``OvercookedWorkspace(shape)``.
-        shape: Rows and columns it must have.
-
-    Raises:
-        LayoutError: Not a layout, of another shape, or a genome that is invalid; names the cell where there is one.
-    """
-    if isinstance(value, OvercookedLayout):
-        layout = value
-    elif isinstance(value, str):
-        layout = OvercookedLayout.from_ascii(value)
-    elif isinstance(value, Sequence) and value and all(isinstance(row, str) for row in value):
-        layout = OvercookedLayout.from_rows(value)
-    elif isinstance(value, Sequence | np.ndarray) and len(value):
-        layout = _read_array(value, shape)
-    else:
-        raise LayoutError(
-            "expected an OvercookedLayout, an ASCII drawing, a nested list of symbols or a genome, "
-            f"got {type(value).__name__}",
-            rule="type",
-        )
-    if layout.shape != shape:
-        raise LayoutError(
-            f"this environment was made for kitchens of shape {shape}, got one of shape {layout.shape}; "
-            "make another with `shape=`",
-            rule="shape",
-        )
-    return layout
-
-
-def _read_array(value: Any, shape: tuple[int, int]) -> OvercookedLayout:
-    first = value[0]
-    if isinstance(first, Sequence) and first and isinstance(first[0], str):
-        try:
-            return OvercookedLayout.from_rows(value)
-        except TypeError as error:
-            raise LayoutError(f"nested lists must hold rows of one-character symbols: {error}", rule="type") from error
-    try:
-        array = np.asarray(value)
-    except ValueError as error:
-        raise LayoutError(f"ragged nested list: {error}", rule="ragged") from error
-    if array.dtype.kind == "U" and array.ndim == 2:
-        return OvercookedLayout.from_rows(array.tolist())
-    if array.dtype.kind not in "iu" or array.ndim not in (1, 2):
-        raise LayoutError(
-            f"expected a genome (1-D integers) or cells (2-D integers or symbols), got {array.ndim}-D {array.dtype}",
-            rule="type",
-        )
-    if array.ndim == 2:
-        return OvercookedLayout(array)
-    from legible_envs.overcooked.workspace import OvercookedWorkspace
-
-    try:
-        return OvercookedWorkspace(shape=shape).decode(array)
-    except LayoutError:
-        raise
-    except ValueError as error:
-        raise LayoutError(f"not a genome of kitchens of shape {shape}: {error}", rule="genome") from error
 
 
 class PackedKitchen(NamedTuple):

@@ -14,15 +14,17 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from legible_envs.drawing.rendered import Windowed
-from legible_envs.overcooked import batch
 from legible_envs.overcooked.batch_game import GameOfBatch
 from legible_envs.overcooked.env import NUM_ACTIONS, OvercookedEnv
-from legible_envs.overcooked.rules import pack_rules
-from legible_envs.overcooked.settings import KitchenSettings, PackedKitchen, count_pots, read_layout
-from legible_envs.overcooked.snapshot import draw_small, make_view, tile_pictures, to_text
-from legible_envs.overcooked.vectors import CROSSINGS, DELIVERIES, STATE_SIZE
-from legible_envs.overcooked.view import GameView
-from legible_envs.specs import JsonSpec, check_options
+from legible_envs.overcooked.game import batch
+from legible_envs.overcooked.game.rules import pack_rules
+from legible_envs.overcooked.game.snapshot import make_view, to_text
+from legible_envs.overcooked.game.vectors import CROSSINGS, DELIVERIES, STATE_SIZE
+from legible_envs.overcooked.game.view import GameView
+from legible_envs.overcooked.layouts import read_layout
+from legible_envs.overcooked.rendering.board import draw_small, tile_pictures
+from legible_envs.overcooked.settings import KitchenSettings, PackedKitchen, count_pots
+from legible_envs.support.specs import JsonSpec, check_options
 
 __all__ = ["OvercookedVectorEnv"]
 

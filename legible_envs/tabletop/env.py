@@ -12,17 +12,16 @@ from gymnasium import spaces
 
 from legible_envs.drawing.rendered import Rendered
 from legible_envs.errors import LayoutError
-from legible_envs.rollouts import Trajectory
-from legible_envs.specs import JsonSpec, check_options
-from legible_envs.tabletop.game import DT, RATE, TableGame
-from legible_envs.tabletop.keys import keys_to_action
+from legible_envs.rollouts.trajectory import Trajectory
+from legible_envs.support.specs import JsonSpec, check_options
+from legible_envs.tabletop.game.game import DT, RATE, TableGame
+from legible_envs.tabletop.game.view import TableView
 from legible_envs.tabletop.layout import TabletopLayout
 from legible_envs.tabletop.observations import Observer
-from legible_envs.tabletop.settings import TableSettings, read_start
+from legible_envs.tabletop.partner.intent import ReachWatcher
+from legible_envs.tabletop.partner.team import Team, make_partner, read_predictor
+from legible_envs.tabletop.settings import TableSettings, keys_to_action, read_start
 from legible_envs.tabletop.task import TabletopTask
-from legible_envs.tabletop.team import Team, make_partner, read_predictor
-from legible_envs.tabletop.view import TableView
-from legible_envs.tabletop.watching import ReachWatcher
 
 __all__ = ["TabletopEnv"]
 
@@ -132,7 +131,7 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
     | `layout_id`     | twelve hexadecimal digits that identify the layout |
     | `belief`        | with a predictor or partner: `{goal: probability}` of the present reach, empty where there is none |
     | `robot_state`, `robot_target` | with a partner: what it does, and with which object |
-    | `completion_time`, `human_idle`, `robot_idle`, `concurrent_activity`, `functional_delay`, `conflicts`, `goals_lost`, `decision_time`, `decision_fraction`, `decided`, `decided_rightly` | with a partner: measures of the team so far, see `legible_envs.tabletop.fluency`; None where not known yet |
+    | `completion_time`, `human_idle`, `robot_idle`, `concurrent_activity`, `functional_delay`, `conflicts`, `goals_lost`, `decision_time`, `decision_fraction`, `decided`, `decided_rightly` | with a partner: measures of the team so far, see `legible_envs.tabletop.partner.fluency`; None where not known yet |
 
     ## Arguments
 
@@ -417,7 +416,7 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
         return self._game.reaches.trajectories(self._game.layout, participant=participant, condition=condition)
 
     def team_measures(self) -> Mapping[str, float]:
-        """Measures of the team so far; see :meth:`~legible_envs.tabletop.fluency.TeamMetrics.summary`."""
+        """Measures of the team so far; see :meth:`~legible_envs.tabletop.partner.fluency.TeamMetrics.summary`."""
         return self._team.summary()
 
     def get_keys_to_action(self) -> dict[tuple[int, ...], npt.NDArray[np.float32]]:

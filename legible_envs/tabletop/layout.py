@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.errors import LayoutError
-from legible_envs.tabletop.things import (
+from legible_envs.tabletop.objects import (
     OBSTACLE_SIZE,
     Table,
     TableObject,
@@ -26,7 +26,7 @@ from legible_envs.tabletop.things import (
 )
 
 if TYPE_CHECKING:
-    from legible_envs.tabletop.paths import ShortestPaths
+    from legible_envs.tabletop.geometry.paths import ShortestPaths
 
 __all__ = ["TabletopLayout"]
 
@@ -139,7 +139,7 @@ class TabletopLayout:
     @cached_property
     def paths(self) -> ShortestPaths:
         """Shortest paths of the hand from anywhere to every object (compiled on first use)."""
-        from legible_envs.tabletop.paths import ShortestPaths
+        from legible_envs.tabletop.geometry.paths import ShortestPaths
 
         return ShortestPaths.of(self)
 
@@ -257,9 +257,9 @@ class TabletopLayout:
 
         Args:
             data: ``schema`` (1), ``objects`` and optionally ``obstacles`` and ``table``: lists of mappings with the
-                attributes of :class:`~legible_envs.tabletop.things.TableObject` and
-                :class:`~legible_envs.tabletop.things.VirtualObstacle`, and a mapping with those of
-                :class:`~legible_envs.tabletop.things.Table`.
+                attributes of :class:`~legible_envs.tabletop.objects.TableObject` and
+                :class:`~legible_envs.tabletop.objects.VirtualObstacle`, and a mapping with those of
+                :class:`~legible_envs.tabletop.objects.Table`.
 
         Raises:
             LayoutError: Another schema, missing or unknown keys, or what the constructors reject.

@@ -8,10 +8,10 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium import spaces
 
-from legible_envs.tabletop.game import FREE, HAND, PLACED, ROBOT, TableGame
+from legible_envs.tabletop.game.game import FREE, HAND, PLACED, ROBOT, TableGame
 from legible_envs.tabletop.layout import TabletopLayout
+from legible_envs.tabletop.partner.team import GRIPPER_SPEED, Team
 from legible_envs.tabletop.task import TabletopTask
-from legible_envs.tabletop.team import GRIPPER_SPEED, Team
 
 __all__ = ["Observer"]
 

@@ -5,18 +5,28 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from functools import cache
+from itertools import product
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+import numpy.typing as npt
 
 from legible_envs.errors import LayoutError, TaskError
-from legible_envs.tabletop.game import CONTACTS, GameRules
+from legible_envs.tabletop.game.game import CONTACTS, GameRules
 from legible_envs.tabletop.layout import TabletopLayout
+from legible_envs.tabletop.objects import Point, point
 from legible_envs.tabletop.task import TabletopTask
-from legible_envs.tabletop.things import Point, point
 
-__all__ = ["TableSettings", "read_layout", "read_start", "read_task"]
+__all__ = ["HAND_SPEED", "TableSettings", "keys_to_action", "read_layout", "read_start", "read_task"]
+
+HAND_SPEED: Final = 0.5
+"""How fast a key moves the hand, m/s: too fast to take anything, so that one takes by letting go."""
+
+_SETS: Final = (
+    {(0, 1): 1073741906, (0, -1): 1073741905, (1, 0): 1073741903, (-1, 0): 1073741904},  # arrows
+    {(0, 1): ord("w"), (0, -1): ord("s"), (1, 0): ord("d"), (-1, 0): ord("a")},
+)
 
 ELSEWHERE: Final = "elsewhere"
 """Name of a start that is none of the table's."""
@@ -202,3 +212,15 @@ def _number(name: str, value: Any, least: float = 0.0, most: float = math.inf) -
         bounds += "" if math.isinf(most) else f" and <= {most:g}"
         raise ValueError(f"`{name}` must be a finite number{bounds}, got {value!r}")
     return float(value)
+
+
+def keys_to_action(max_speed: float) -> dict[tuple[int, ...], npt.NDArray[np.float32]]:
+    """Arrows or W A S D, one or two at a time, and the action they stand for."""
+    actions: dict[tuple[int, ...], npt.NDArray[np.float32]] = {}
+    for keys in _SETS:
+        for x, y in product((-1, 0, 1), repeat=2):
+            pressed = [key for way, key in keys.items() if way in ((x, 0), (0, y)) and way != (0, 0)]
+            if pressed:
+                velocity = np.array([x, y]) / math.hypot(x, y) * min(HAND_SPEED / max_speed, 1.0)
+                actions[tuple(sorted(pressed))] = velocity.astype(np.float32)
+    return actions

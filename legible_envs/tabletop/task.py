@@ -12,7 +12,7 @@ import numpy as np
 
 from legible_envs.errors import TaskError
 from legible_envs.tabletop.layout import TabletopLayout
-from legible_envs.tabletop.things import Point, point, rectangle, rectangles_overlap
+from legible_envs.tabletop.objects import Point, point, rectangle, rectangles_overlap
 from legible_envs.tasks import TaskGraph
 
 __all__ = ["TabletopTask", "task_names"]

@@ -37,7 +37,7 @@ def check_emitter(
         EmitterError: Something is wrong; ``problems`` lists each in a sentence.
     """
     if workspace is None:
-        from legible_envs.overcooked.workspace import OvercookedWorkspace
+        from legible_envs.overcooked.design.workspace import OvercookedWorkspace
 
         workspace = OvercookedWorkspace(shape=(5, 5))
     name = emitter_name(emitter)

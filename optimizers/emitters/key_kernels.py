@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from legible_envs.compiled import kernel
-from legible_envs.overcooked.genomes import Geometry, connected, place_obstacles
+from legible_envs.overcooked.scoring.genome_kernels import Geometry, connected, place_obstacles
+from legible_envs.support.compiled import kernel
 
 __all__ = ["decode_kitchens"]
 

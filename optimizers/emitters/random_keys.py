@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 if TYPE_CHECKING:
-    from legible_envs.overcooked.workspace import OvercookedWorkspace
+    from legible_envs.overcooked.design.workspace import OvercookedWorkspace
 
 __all__ = ["BoundedKeys", "Keys", "KitchenKeys", "random_keys"]
 

@@ -38,7 +38,7 @@ from typing import Any
 
 import numpy as np
 
-from legible_envs.plugins import Plugin, Registry, target_of
+from legible_envs.support.plugins import Plugin, Registry, target_of
 from optimizers.errors import EmitterError
 
 __all__ = ["ENTRY_POINT_GROUP", "EmitterInfo", "EmitterSpec", "emitter_name", "list_emitters", "make_emitter"]

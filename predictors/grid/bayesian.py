@@ -10,8 +10,8 @@ import numpy.typing as npt
 from sklearn.base import clone
 
 from legible_envs.overcooked.layout import OvercookedLayout
-from legible_envs.rollouts import Trajectory
-from predictors.grid.distances import GridPredictor, check_complete, posterior, remaining_steps
+from legible_envs.rollouts.trajectory import Trajectory
+from predictors.grid.base import GridPredictor, check_complete, posterior, remaining_steps
 from predictors.grid.graphs import optimal_costs, soft_costs, walk_graph
 from predictors.grid.maxent_irl import MaxEntIRL
 from predictors.grid.priors import GoalPrior, Prior

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.overcooked.layout import OvercookedLayout
-from predictors.grid.walk_sums import cheapest_costs, walk_costs
+from predictors.grid.walk_kernels import cheapest_costs, walk_costs
 
 __all__ = ["WalkGraph", "optimal_costs", "soft_costs", "walk_graph"]
 

@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.overcooked.layout import OvercookedLayout
-from legible_envs.rollouts import Trajectory
-from predictors.grid.distances import GridPredictor, check_complete, posterior
+from legible_envs.rollouts.trajectory import Trajectory
+from predictors.grid.base import GridPredictor, check_complete, posterior
 from predictors.grid.graphs import soft_costs
 from predictors.grid.priors import GoalPrior, Prior
 from predictors.grid.walk_likelihood import (

@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.overcooked.layout import OvercookedLayout
-from legible_envs.rollouts import Trajectory
-from predictors.grid.distances import GridPredictor, check_complete, check_walk, remaining_steps
+from legible_envs.rollouts.trajectory import Trajectory
+from predictors.grid.base import GridPredictor, check_complete, check_walk, remaining_steps
 from predictors.grid.priors import GoalPrior
 
 __all__ = ["PrefixEncoder", "PrefixPredictor", "distinct_prefixes"]

@@ -8,10 +8,10 @@ from typing import Literal, Self
 import numpy as np
 import numpy.typing as npt
 
-from legible_envs.rollouts import Trajectory
+from legible_envs.rollouts.trajectory import Trajectory
 from predictors.base import TIE_TOLERANCE
-from predictors.grid.distances import GridPredictor, check_walk, remaining_steps
-from predictors.reaching.places import goal_places, learn_places, straight_lines
+from predictors.grid.base import GridPredictor, check_walk, remaining_steps
+from predictors.reaching.base import goal_places, learn_places, straight_lines
 
 __all__ = ["ShortestDistance"]
 

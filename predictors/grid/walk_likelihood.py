@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.overcooked.layout import OvercookedLayout
-from legible_envs.rollouts import Trajectory
+from legible_envs.rollouts.trajectory import Trajectory
 from predictors.grid.graphs import WalkGraph, walk_graph
-from predictors.grid.walk_sums import likelihood
+from predictors.grid.walk_kernels import likelihood
 
 __all__ = ["Evidence", "FeatureMap", "Fit", "best_uniform_cost", "collect_evidence", "minimise"]
 

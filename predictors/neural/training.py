@@ -49,7 +49,7 @@ class Examples(NamedTuple):
 
 @dataclass(frozen=True)
 class Training:
-    """How to train; see :class:`predictors.neural.predictor.NeuralPredictor`."""
+    """How to train; see :class:`predictors.neural.base.NeuralPredictor`."""
 
     members: int
     learning_rate: float

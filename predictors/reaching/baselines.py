@@ -13,7 +13,7 @@ from sklearn.neighbors import KNeighborsClassifier
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
-from legible_envs.rollouts import Cut, Trajectory
+from legible_envs.rollouts.trajectory import Cut, Trajectory
 from predictors.base import FRACTIONS, GoalPredictor
 from predictors.reaching.features import Reach, check_dimension, check_reaches
 

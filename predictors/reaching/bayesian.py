@@ -8,9 +8,9 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from legible_envs.rollouts import Trajectory
+from legible_envs.rollouts.trajectory import Trajectory
 from legible_envs.tabletop.layout import TabletopLayout
-from predictors.reaching.places import PlacePredictor, straight_lines
+from predictors.reaching.base import PlacePredictor, straight_lines
 
 __all__ = ["StraightLineBayesian"]
 
@@ -26,7 +26,7 @@ class StraightLineBayesian(PlacePredictor):
     where reaches ended in ``fit``. Over a :class:`~legible_envs.tabletop.TabletopLayout` it is the shortest path among
     the obstacles to the object of that name: a hand inside an obstacle counts as being at the nearest free point, and
     where there is no way the straight line counts, so that every cost is finite. This is the belief of
-    :class:`~legible_envs.tabletop.belief.EqOneBelief`.
+    :class:`~legible_envs.tabletop.partner.belief.EqOneBelief`.
 
     Args:
         beta: Rationality, per metre. Which goal is on top does not depend on it.
@@ -65,7 +65,7 @@ class StraightLineBayesian(PlacePredictor):
         """
         if not self.obstacles or not isinstance(walk.layout, TabletopLayout):
             return super().weigh_walk(walk)
-        from legible_envs.tabletop.belief import EqOneBelief
+        from legible_envs.tabletop.partner.belief import EqOneBelief
 
         self._check_beta()
         if walk.is_grid or walk.states.shape[1] != 2:

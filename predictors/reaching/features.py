@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from legible_envs.rollouts import Trajectory
+from legible_envs.rollouts.trajectory import Trajectory
 
 __all__ = ["Reach", "check_dimension", "check_reaches", "resample"]
 

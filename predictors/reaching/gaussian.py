@@ -8,11 +8,11 @@ from typing import Final, Literal, Self
 import numpy as np
 import numpy.typing as npt
 
-from legible_envs.rollouts import Cut, Trajectory
+from legible_envs.rollouts.trajectory import Cut, Trajectory
 from predictors.base import FRACTIONS, GoalPredictor, GoalStream
-from predictors.reaching.alignment import dba_step, match_means, pairwise_costs
+from predictors.reaching.alignment_kernels import dba_step, match_means, pairwise_costs
 from predictors.reaching.features import Reach, check_dimension, check_reaches, resample
-from predictors.reaching.open_end import observe
+from predictors.reaching.open_end_kernels import observe
 
 __all__ = ["ReachStream", "TimeSeriesGaussian"]
 

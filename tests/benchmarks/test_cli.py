@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
-from benchmarks.cli import main
-from benchmarks.kitchens import load_kitchen
+from benchmarks.cli.app import main
+from benchmarks.presenters.overcooked import load_kitchen
 from legible_envs import __version__
 from legible_envs.overcooked import OvercookedLayout, OvercookedWorkspace
 from tests.support.run_folders import write_run
@@ -274,8 +274,8 @@ def walks_of_run(run: Path, tmp_path: Path) -> Path:
 
     from legible_envs.overcooked import OvercookedLayout
     from legible_envs.overcooked.policies import ScriptedPlayer
-    from legible_envs.overcooked.walks import record_episode
-    from legible_envs.rollouts_io import write_csv
+    from legible_envs.overcooked.trajectories import record_episode
+    from legible_envs.rollouts import write_csv
 
     layout = OvercookedLayout.from_ascii((run / "best.txt").read_text())
     env = gym.make("LegibleOvercooked-v0", shape=layout.shape, layout=layout)
@@ -292,8 +292,7 @@ def test_score_judges_predictors_and_reports_them(run: Path, walks_of_run: Path)
 
     import pandas as pd
 
-    from legible_envs.rollouts import CUTS
-    from legible_envs.rollouts_io import read_csv
+    from legible_envs.rollouts import CUTS, read_csv
     from predictors.evaluation import compare_conditions, evaluate
 
     options = ("--cut", "cells", "--folds", 2, "--repeats", 1, "--by-participant", "--seed", 3)
@@ -338,7 +337,7 @@ def test_files_of_a_reading_cannot_run_anything(run: Path, walks_of_run: Path, t
     )
     assert result.exit_code == 0, result.output
     assert not (out / "learning_curve.svg").exists()
-    from benchmarks.people import reading_section
+    from benchmarks.reports.prediction_report import reading_section
 
     (out / "accuracy.svg").write_text("<svg><script>alert(1)</script></svg>")
     text = (out / "reading.json").read_text().replace('"notes": []', '"notes": ["<script>alert(1)</script>"]')
@@ -402,7 +401,7 @@ def test_version() -> None:
 
 def test_help_loads_nothing_heavy() -> None:
     code = (
-        "import sys; from benchmarks.cli import main\n"
+        "import sys; from benchmarks.cli.app import main\n"
         "try: main(['--help'])\n"
         "except SystemExit: pass\n"
         "heavy = {'numba', 'ribs', 'sklearn', 'pandas', 'pygame', 'torch', 'scipy'} & sys.modules.keys()\n"
@@ -415,7 +414,7 @@ def test_help_loads_nothing_heavy() -> None:
 def test_output_survives_a_terminal_without_unicode(tmp_path: Path) -> None:
     (tmp_path / "k.txt").write_text(KITCHEN)
     done = subprocess.run(
-        [sys.executable, "-m", "benchmarks.cli", "show", str(tmp_path / "k.txt")],
+        [sys.executable, "-m", "benchmarks.cli.app", "show", str(tmp_path / "k.txt")],
         capture_output=True,
         env={**os.environ, "PYTHONIOENCODING": "ascii"},
         check=False,

@@ -12,12 +12,12 @@ import pytest
 from click.testing import CliRunner, Result
 from PIL import Image
 
-from benchmarks.boards import CONDITIONS, boards_of
-from benchmarks.cli import main
+from benchmarks.cli.app import main
+from benchmarks.presenters.tabletop_panels import CONDITIONS, boards_of
 from benchmarks.runs import read_run
 from legible_envs.tabletop import TabletopLayout, TabletopTask, VirtualObstacle
-from legible_envs.tabletop.scoring import TabletopScorer
-from legible_envs.tabletop.workspace import TabletopWorkspace
+from legible_envs.tabletop.design.workspace import TabletopWorkspace
+from legible_envs.tabletop.scoring.scorer import TabletopScorer
 
 SMALL = ("--evaluations", 1200, "--quiet", "--emitter", "improve")
 

@@ -11,9 +11,9 @@ import pandas as pd
 import pytest
 from rich.console import Console
 
-from benchmarks.demo import RANDOM_LAYOUTS, conditions, recorded_play, run_demo
+from benchmarks.cli.demo import RANDOM_LAYOUTS, conditions, recorded_play, run_demo
+from legible_envs.datasets.overcooked_2019 import RecordingsError, load_recorded_games
 from legible_envs.overcooked import OvercookedLayout, OvercookedWorkspace
-from legible_envs.overcooked.recordings import RecordingsError, load_recorded_games
 
 TINY = {"shape": (5, 5), "evaluations": 3000, "efficient_evaluations": 2000}
 
@@ -94,7 +94,7 @@ def test_it_replaces_an_earlier_demonstration(demo: tuple[Path, str], monkeypatc
 
 
 def test_no_network_is_one_line_not_an_error(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    from legible_envs.overcooked import recordings
+    from legible_envs.datasets import overcooked_2019 as recordings
 
     def refuse(*_: object, **__: object) -> None:
         raise RecordingsError("no package index\ncan be reached")
@@ -106,8 +106,8 @@ def test_no_network_is_one_line_not_an_error(monkeypatch: pytest.MonkeyPatch, tm
 @pytest.mark.data
 @pytest.mark.skipif(not have_recordings(), reason="the recorded games are not here: legible humans fetch")
 def test_recorded_play_agrees_with_every_walk_scored_by_itself() -> None:
-    from benchmarks.human_play.run import score_every_walk
-    from benchmarks.human_play.sweep import UNTRAINED
+    from benchmarks.experiments.prediction.run import score_every_walk
+    from benchmarks.experiments.prediction.sweep import UNTRAINED
 
     walks = score_every_walk(predictors=UNTRAINED, repeats=1)
     summary = recorded_play(fetch=False)

@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks.hypotheses import HYPOTHESES, assess_hypotheses, hedges_g, reached_at
-from predictors.statistics import compare_conditions
+from benchmarks.experiments.hypotheses import HYPOTHESES, assess_hypotheses, hedges_g, reached_at
+from predictors.evaluation.statistics import compare_conditions
 
 FRACTIONS = (0.1, 0.3, 0.5, 0.7, 0.9)
 

@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks.optimizer_comparison import FULL, QUICK, Settings, reproduce, sections
-from benchmarks.optimizer_comparison.analysis import (
+from benchmarks.experiments.optimizers import FULL, QUICK, Settings, reproduce, sections
+from benchmarks.experiments.optimizers.analysis import (
     anytime,
     beside_local_search,
     beside_published,
@@ -15,8 +15,8 @@ from benchmarks.optimizer_comparison.analysis import (
     pairwise,
     summary,
 )
-from benchmarks.optimizer_comparison.run import run_cell
-from benchmarks.optimizer_comparison.sweep import METHODS, OPTIMUM_5X5, PUBLISHED, cells_of
+from benchmarks.experiments.optimizers.run import run_cell
+from benchmarks.experiments.optimizers.sweep import METHODS, OPTIMUM_5X5, PUBLISHED, cells_of
 from legible_envs.overcooked import OvercookedLayout, OvercookedWorkspace
 from optimizers import list_emitters
 

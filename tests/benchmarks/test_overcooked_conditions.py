@@ -11,10 +11,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks.overcooked_conditions import analysis, run, tables
-from benchmarks.overcooked_conditions.people import best_slip, draw_person, fit_planner
-from benchmarks.overcooked_conditions.planner_likelihood import step_probabilities
-from benchmarks.overcooked_conditions.sweep import (
+from benchmarks.experiments.overcooked import analysis, run, tables
+from benchmarks.experiments.overcooked.sweep import (
     CONDITIONS,
     FITTED,
     FULL,
@@ -29,7 +27,9 @@ from benchmarks.overcooked_conditions.sweep import (
 )
 from legible_envs.overcooked import OvercookedLayout, OvercookedWorkspace
 from legible_envs.overcooked.humans import BoltzmannWalker, PlannerWalker
-from legible_envs.overcooked.rationality import make_way
+from legible_envs.overcooked.humans.fitting import make_way
+from legible_envs.overcooked.humans.kernels import step_probabilities
+from legible_envs.overcooked.humans.planner_fitting import best_slip, draw_person, fit_planner
 
 ROOM = OvercookedLayout.from_ascii("XOXXTXX\nX     X\nX  X  X\nX     D\nXXPXXSX")
 TINY = Settings(

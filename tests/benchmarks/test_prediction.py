@@ -11,11 +11,11 @@ import pytest
 from click.testing import CliRunner
 from rich.console import Console
 
-from benchmarks.cli import main
-from benchmarks.human_play import load_pointing, run
-from benchmarks.human_play.analysis import reference_rows, to_markdown
-from benchmarks.human_play.command import judge_people
-from benchmarks.human_play.sweep import (
+from benchmarks.cli.app import main
+from benchmarks.cli.humans import judge_people
+from benchmarks.experiments.prediction import run
+from benchmarks.experiments.prediction.analysis import reference_rows, to_markdown
+from benchmarks.experiments.prediction.sweep import (
     LAYOUTS,
     NEURAL,
     POINTING_NEURAL,
@@ -26,6 +26,7 @@ from benchmarks.human_play.sweep import (
     Experiment,
     Setting,
 )
+from legible_envs.datasets.pointing import load_pointing
 from predictors.neural import training
 
 ABOUT = {"definition": "so many cells", "ties": "fractional", "cut": "cells", "candidate_set": "all"}

@@ -10,14 +10,14 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from benchmarks.cells import run_cells
-from benchmarks.recorded_people import analysis, run
-from benchmarks.recorded_people.analysis import correlate, detectable, places_of, spearman, spearman_rows
-from benchmarks.recorded_people.sweep import FULL, QUICK, reading_cells, score_cells
+from benchmarks.experiments.recorded import analysis, run
+from benchmarks.experiments.recorded.analysis import correlate, detectable, places_of, spearman, spearman_rows
+from benchmarks.experiments.recorded.sweep import FULL, QUICK, reading_cells, score_cells
+from benchmarks.trials import run_cells
 from legible_envs.legibility import From, goal_legibility
 from legible_envs.overcooked import OvercookedLayout
 from legible_envs.overcooked.humans import simulate_participants
-from legible_envs.overcooked.scoring import grid_graph
+from legible_envs.overcooked.scoring.explanation import grid_graph
 
 
 def logged(slope: float, places: int = 20, people: int = 12, seed: int = 0) -> tuple[pd.DataFrame, pd.DataFrame]:

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.report import MAX_LAYOUTS, Condition, write_best_image, write_report
+from benchmarks.presenters.base import Condition
+from benchmarks.reports.search_report import MAX_LAYOUTS, write_best_image, write_report
 from benchmarks.runs import RunError, read_run
 from legible_envs.overcooked import OvercookedLayout, OvercookedWorkspace
 from tests.support.run_folders import write_full_run, write_run, write_run_of

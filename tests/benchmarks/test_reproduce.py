@@ -13,12 +13,11 @@ import pytest
 from click.testing import CliRunner
 from PIL import Image
 
-from benchmarks import reproducing
-from benchmarks.cells import run_cells
-from benchmarks.cli import main
-from benchmarks.experiment_report import write_experiment_report
-from benchmarks.sections import Section, write_tables
-from legible_envs.overcooked.recordings import RecordingsError
+from benchmarks.cli import reproduce as reproducing
+from benchmarks.cli.app import main
+from benchmarks.reports.experiment_report import Section, write_experiment_report, write_tables
+from benchmarks.trials import run_cells
+from legible_envs.datasets.overcooked_2019 import RecordingsError
 
 
 @pytest.fixture

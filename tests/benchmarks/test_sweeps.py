@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 
-from benchmarks.cli import main
+from benchmarks.cli.app import main
 from benchmarks.sweeps import Sweep, SweepError, run_sweep
 from benchmarks.sweeps.analysis import for_reading
 from legible_envs.workspace import make_workspace

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks.conditions import (
+from benchmarks.experiments.conditions import (
     accuracy_by_condition,
     bars_by_condition,
     beside_published,
@@ -22,12 +22,20 @@ from benchmarks.conditions import (
     slug,
     stacked,
 )
-from benchmarks.judging import Judge, by_table, confusion_matrix, curve_rows, judged_rows, logged_rows, make_judge
-from benchmarks.sections import Section
-from benchmarks.tabletop_conditions import QUICK, Settings, reproduce, run, sections, sweep, tables, words
-from benchmarks.tabletop_conditions.readers import NoReader
+from benchmarks.experiments.tabletop import QUICK, Settings, narrative, reproduce, run, sections, sweep, tables
+from benchmarks.experiments.trial_rows import (
+    Judge,
+    by_table,
+    confusion_matrix,
+    curve_rows,
+    judged_rows,
+    logged_rows,
+    make_judge,
+)
+from benchmarks.reports.experiment_report import Section
 from legible_envs.rollouts import Trajectory
 from legible_envs.tabletop import TabletopLayout, TabletopTask, TabletopWorkspace
+from predictors.base import NoReader
 
 SMALL = Settings(
     layouts=2,
@@ -296,7 +304,7 @@ def test_words_follow_the_numbers() -> None:
                 for c, v in {"Random": 0.1, **values}.items()
             ]
         )
-        return words.agreement(tables.beside_published(metrics, ["A", "B"]), metrics, ["A", "B"])
+        return narrative.agreement(tables.beside_published(metrics, ["A", "B"]), metrics, ["A", "B"])
 
     paper = {name: known["f1"] for name, known in sweep.PUBLISHED.items()}
     same = rows(paper)
@@ -319,7 +327,7 @@ def test_words_say_where_people_who_ignore_obstacles_cost_more_than_they_gain() 
             "Placement": 0.85,
         }
     )
-    text = words.about_compliance(table)
+    text = narrative.about_compliance(table)
     assert "Virtual Obstacle goes from 0.900 to 0.700, below Placement from 50 % on" in text
     assert "Both goes from 0.950 to 0.910, never below Placement" in text
 

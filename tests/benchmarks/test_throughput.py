@@ -19,9 +19,9 @@ from benchmarks.throughput.measure import Figure, alternate, rate
 from benchmarks.throughput.peer_maxent_irl import tasks
 from benchmarks.throughput.peer_tabletop import stages_of, straight_line_loss, straight_line_losses
 from benchmarks.throughput.peers import IMITATION, IRL_MAXENT, OVERCOOKED_AI, Peer, PeerError, open_peer, opened
-from benchmarks.throughput.reading import noisy_walks, reading, save_problem
+from benchmarks.throughput.predictors_grid import noisy_walks, reading, save_problem
 from benchmarks.throughput.sweep import OPTIMUM_5X5, TARGETS, Settings, Target
-from benchmarks.throughput.tables import _episodes, replay, tables_with
+from benchmarks.throughput.tabletop import _episodes, replay, tables_with
 from legible_envs.tabletop import TabletopTask
 
 TINY = Settings(

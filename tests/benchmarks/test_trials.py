@@ -15,10 +15,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks.cells import CellsFailed, CellStore, Event, run_cells
+from benchmarks.trials import CellsFailed, CellStore, Event, run_cells
 from legible_envs.overcooked import OvercookedWorkspace
 from optimizers import search
-from optimizers.cluster import connect
+from optimizers.evaluator import connect
 from tests.benchmarks import cell_functions
 
 CELLS = [{"seed": seed, "settings": {"size": 3}, "shape": [7, 7]} for seed in range(5)]

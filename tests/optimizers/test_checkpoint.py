@@ -14,11 +14,11 @@ import time
 import numpy as np
 import pytest
 
-from legible_envs.files import remove_leftovers, write_atomically
+from legible_envs.support.files import remove_leftovers, write_atomically
 from optimizers import CheckpointError, load_run, search
-from optimizers import checkpoint as checkpoints
 from optimizers.archives import archive_arrays, read_archive
-from optimizers.run_folder import RunFolder
+from optimizers.runs import checkpoint as checkpoints
+from optimizers.runs.folder import RunFolder
 from tests.support.shelf_workspace import ShelfWorkspace
 
 SHELF = ShelfWorkspace()
@@ -267,7 +267,7 @@ def test_another_version_is_refused_with_the_version_to_install(run, monkeypatch
     folder, settings = run
     versions = {"python": "3.11", "numpy": "2.4", "ribs": "0.13.0", "legible-envs": "0.1.0"}
     header = json.loads(newest(folder)[-1].read_bytes().split(b"\n")[1])
-    monkeypatch.setattr("optimizers.run.pickle_versions", lambda: {**header["versions"], "ribs": "99.0"})
+    monkeypatch.setattr("optimizers.search_run.pickle_versions", lambda: {**header["versions"], "ribs": "99.0"})
     with pytest.raises(CheckpointError, match=r"written with ribs 0\.12.*this is ribs 99\.0.*install ribs==0\.12"):
         search(SHELF, checkpoint=folder, resume=True, **settings)
     assert versions.keys() == header["versions"].keys()

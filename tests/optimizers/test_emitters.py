@@ -10,7 +10,7 @@ from ribs.schedulers import Scheduler
 from legible_envs.overcooked import OvercookedWorkspace
 from optimizers import EmitterError, ImproveWorkspaceEmitter, RandomWorkspaceEmitter, make_archive, make_emitter
 from optimizers.emitters.adapter import FloatArchiveView, GenomeAdapter
-from optimizers.evaluate import Evaluator
+from optimizers.evaluator import Evaluator
 from tests.support.shelf_workspace import ShelfWorkspace
 
 SHELF = ShelfWorkspace()

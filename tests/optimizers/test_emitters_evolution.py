@@ -6,7 +6,7 @@ from ribs.schedulers import Scheduler
 from scipy.optimize import differential_evolution
 
 from optimizers import CmaMaeEmitter, CmaMeEmitter, DifferentialEvolutionEmitter, make_archive, search
-from optimizers.evaluate import Evaluator
+from optimizers.evaluator import Evaluator
 from tests.support.shelf_workspace import ShelfWorkspace
 
 SHELF = ShelfWorkspace()

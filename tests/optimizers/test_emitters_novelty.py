@@ -8,7 +8,7 @@ from hypothesis.extra.numpy import arrays
 
 from optimizers import NoveltyLocalCompetitionEmitter, make_archive
 from optimizers.emitters.novelty import crowding_distances, novelty_and_competition, pareto_ranks
-from optimizers.evaluate import Evaluator
+from optimizers.evaluator import Evaluator
 from tests.support.shelf_workspace import ShelfWorkspace
 
 SHELF = ShelfWorkspace()

@@ -6,7 +6,7 @@ from ribs.schedulers import Scheduler
 
 from legible_envs.tabletop import TabletopWorkspace
 from optimizers import ImproveWorkspaceEmitter, make_archive, search
-from optimizers.evaluate import Evaluator
+from optimizers.evaluator import Evaluator
 from tests.optimizers.test_emitters import LiteralMapElites
 
 CONDITIONS = ("both", "placement", "obstacles")

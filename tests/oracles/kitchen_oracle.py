@@ -9,10 +9,10 @@ import numpy as np
 
 from legible_envs.errors import LayoutError
 from legible_envs.overcooked import PAPER_SOUPS, OvercookedLayout
-from legible_envs.overcooked.dynamics import start
-from legible_envs.overcooked.rules import GameRules, pack_kitchen, pack_rules
-from legible_envs.overcooked.snapshot import make_view
-from legible_envs.overcooked.vectors import STATE_SIZE
+from legible_envs.overcooked.game.dynamics import start
+from legible_envs.overcooked.game.rules import GameRules, pack_kitchen, pack_rules
+from legible_envs.overcooked.game.snapshot import make_view
+from legible_envs.overcooked.game.vectors import STATE_SIZE
 
 MOVES = ((-1, 0), (1, 0), (0, 1), (0, -1))
 STATIONS = {"T": "tomato", "O": "onion", "C": "cabbage", "F": "fish", "D": "dish"}

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from predictors.reaching.alignment import closed_cost, closed_path, dba_step, match_means, pairwise_costs
-from predictors.reaching.open_end import advance, log_densities, observe
+from predictors.reaching.alignment_kernels import closed_cost, closed_path, dba_step, match_means, pairwise_costs
+from predictors.reaching.open_end_kernels import advance, log_densities, observe
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 sizes = st.integers(1, 5)

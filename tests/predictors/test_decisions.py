@@ -22,7 +22,7 @@ from predictors import (
     make_predictor,
 )
 from predictors.checks import example_walks
-from predictors.streaming import Decision, summarise_decisions
+from predictors.evaluation.decisions import Decision, summarise_decisions
 
 BUILT_IN = sorted(name for name, info in list_predictors().items() if info.origin == "built in")
 QUICK: dict[str, dict[str, Any]] = {

@@ -12,7 +12,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from predictors.figures import accuracy_figure, confusion_figure, learning_curve_figure, round_ticks, save_figure
+from predictors.evaluation.figures import (
+    accuracy_figure,
+    confusion_figure,
+    learning_curve_figure,
+    round_ticks,
+    save_figure,
+)
 
 SVG = "{http://www.w3.org/2000/svg}"
 

@@ -13,11 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sklearn.base import clone
 
-from benchmarks.human_play import PREDICTORS, compare_with_reference, score_recorded_play
-from benchmarks.human_play.sweep import LAYOUTS, REFERENCE
+from benchmarks.experiments.prediction import PREDICTORS, compare_with_reference, score_recorded_play
+from benchmarks.experiments.prediction.sweep import LAYOUTS, REFERENCE
+from legible_envs.datasets.overcooked_2019 import RecordingsError, recorded_trajectories
 from legible_envs.errors import LayoutError
 from legible_envs.overcooked import OvercookedLayout
-from legible_envs.overcooked.recordings import RecordingsError, recorded_trajectories
 from legible_envs.rollouts import Trajectory
 from predictors import (
     BayesianGoalPredictor,
@@ -31,7 +31,7 @@ from predictors import (
 )
 from predictors.checks import example_walks
 from predictors.grid.graphs import walk_graph
-from predictors.grid.nearest import votes_of_nearest
+from predictors.grid.nearest_kernels import votes_of_nearest
 from predictors.grid.priors import GoalPrior
 
 ROOM = OvercookedLayout.from_ascii("XOXTX\nX   X\nX V D\nX   X\nXXSPX")

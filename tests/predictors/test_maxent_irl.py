@@ -17,8 +17,8 @@ from legible_envs.rollouts import Trajectory
 from predictors import BayesianGoalPredictor, MaxEntIRL, check_predictor
 from predictors.checks import example_walks
 from predictors.grid.graphs import optimal_costs, soft_costs, walk_graph
+from predictors.grid.walk_kernels import factorise, solve, solve_transposed
 from predictors.grid.walk_likelihood import MOST_RATIONAL, best_uniform_cost, collect_evidence
-from predictors.grid.walk_sums import factorise, solve, solve_transposed
 
 ROOM = OvercookedLayout.from_ascii("XOXTX\nX   X\nX V D\nX   X\nXXSPX")
 OPEN = OvercookedLayout.from_ascii("XXOXTXX\nX     X\nX     X\nX     D\nX     X\nXXXSPXX")

@@ -15,13 +15,13 @@ from sklearn.base import clone
 from sklearn.exceptions import NotFittedError
 from sklearn.model_selection import StratifiedKFold
 
-from legible_envs.overcooked.recordings import RecordingsError, recorded_trajectories
+from legible_envs.datasets.overcooked_2019 import RecordingsError, recorded_trajectories
 from legible_envs.rollouts import Trajectory
 from predictors import RecurrentPredictor, TransformerPredictor, check_predictor, make_predictor
 from predictors.checks import example_walks
+from predictors.neural.base import NeuralPredictor
 from predictors.neural.encoding import Encoding
 from predictors.neural.networks import NUMPY, Gru, Network, Transformer
-from predictors.neural.predictor import NeuralPredictor
 from tests.support.pointing import grouped_accuracy, needs_pointing
 
 torch = pytest.importorskip("torch", reason="the extra `torch` is not installed")

@@ -15,15 +15,15 @@ from sklearn.base import clone
 from sklearn.exceptions import NotFittedError
 
 import predictors.registry as registry
-from benchmarks.human_play import UNTRAINED, accuracy_table, score_recorded_play
-from benchmarks.human_play.run import score_every_walk
-from benchmarks.human_play.sweep import LAYOUTS
-from legible_envs import plugins
+from benchmarks.experiments.prediction import UNTRAINED, accuracy_table, score_recorded_play
+from benchmarks.experiments.prediction.run import score_every_walk
+from benchmarks.experiments.prediction.sweep import LAYOUTS
+from legible_envs.datasets.overcooked_2019 import RecordingsError, load_recorded_games
 from legible_envs.errors import LayoutError
 from legible_envs.legibility import optimal_costs, posterior
 from legible_envs.overcooked import OvercookedLayout
-from legible_envs.overcooked.recordings import RecordingsError, load_recorded_games
 from legible_envs.rollouts import CUTS, Trajectory
+from legible_envs.support import plugins
 from predictors import (
     BayesianGoalPredictor,
     GoalPredictor,

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from sklearn.model_selection import GroupKFold
 
-from benchmarks.human_play.pointing import load_pointing as read_pointing
+from legible_envs.datasets.pointing import load_pointing as read_pointing
 from legible_envs.rollouts import Trajectory
 from predictors import GoalPredictor
 

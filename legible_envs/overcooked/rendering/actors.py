@@ -7,10 +7,10 @@ from functools import lru_cache
 from typing import Final
 
 from legible_envs.drawing.canvas import Canvas, Sprite, mix
+from legible_envs.overcooked.game.view import Item, PotView
 from legible_envs.overcooked.rendering.food import draw_item, draw_pieces, soup_colour
 from legible_envs.overcooked.rendering.palette import PALETTE, PLAYER_COLOURS
 from legible_envs.overcooked.rendering.tiles import COUNTER_TOP
-from legible_envs.overcooked.view import Item, PotView
 
 __all__ = ["CHEF_RISE", "chef_sprite", "draw_tick", "pot_sprite"]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
@@ -9,18 +10,22 @@ from functools import lru_cache
 from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
 from legible_envs.drawing.canvas import Canvas, Image, Sprite, paste, rgb, text_sprite
 from legible_envs.drawing.sheets import banner, check_tile
+from legible_envs.overcooked.game.view import GameView, PotView
 from legible_envs.overcooked.layout import FLOOR, OBSTACLE, STATION_CODES, Cell, OvercookedLayout
 from legible_envs.overcooked.rendering.actors import chef_sprite, pot_sprite
 from legible_envs.overcooked.rendering.food import item_sprite
 from legible_envs.overcooked.rendering.hud import draw_hud, hud_height
 from legible_envs.overcooked.rendering.palette import PALETTE, PLAYER_COLOURS
 from legible_envs.overcooked.rendering.tiles import tile_sprite
-from legible_envs.overcooked.view import GameView, PotView
 
-__all__ = ["board_of", "draw_game", "draw_layout", "paste_label"]
+__all__ = ["RGB_TILE", "board_of", "draw_game", "draw_layout", "draw_small", "paste_label", "tile_pictures"]
+
+RGB_TILE: Final = 12
+"""Pixels per cell of an ``rgb`` observation."""
 
 _POT: Final = STATION_CODES["pot"]
 _SERVING: Final = STATION_CODES["serving"]
@@ -220,3 +225,19 @@ def _away(layout: OvercookedLayout, cell: Cell) -> int:
         if layout.is_floor((row + dr, col + dc)):
             return side
     return 0
+
+
+def draw_small(view: GameView) -> npt.NDArray[np.uint8]:
+    """The picture of an ``rgb`` observation, ``(H * RGB_TILE, W * RGB_TILE, 3)``."""
+    return np.array(draw_game(view, tile=RGB_TILE, hud=False), dtype=np.uint8)
+
+
+def tile_pictures(views: Sequence[GameView], side: int = 1200) -> npt.NDArray[np.uint8]:
+    """All games in one picture of about ``side`` pixels, row by row."""
+    columns = math.ceil(math.sqrt(len(views)))
+    height, width = views[0].layout.shape
+    tile = max(8, min(48, side // (columns * max(height, width))))
+    pictures = [np.asarray(draw_game(view, tile=tile, hud=False), dtype=np.uint8) for view in views]
+    pictures += [np.full_like(pictures[0], 255)] * (-len(pictures) % columns)
+    rows = [np.concatenate(pictures[i : i + columns], axis=1) for i in range(0, len(pictures), columns)]
+    return np.concatenate(rows, axis=0)

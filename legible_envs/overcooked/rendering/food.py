@@ -8,9 +8,9 @@ from functools import lru_cache
 from typing import Final
 
 from legible_envs.drawing.canvas import Canvas, Sprite, mix
+from legible_envs.overcooked.game.view import Item
 from legible_envs.overcooked.layout import INGREDIENTS
 from legible_envs.overcooked.rendering.palette import PALETTE
-from legible_envs.overcooked.view import Item
 
 __all__ = ["draw_ingredient", "draw_item", "draw_pieces", "draw_plate", "item_sprite", "soup_colour"]
 

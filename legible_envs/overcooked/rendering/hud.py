@@ -9,12 +9,12 @@ from typing import Final
 import numpy as np
 
 from legible_envs.drawing.canvas import Canvas, Image, Sprite, mix, paste, rgb, text_sprite
+from legible_envs.overcooked.game.view import GameView
 from legible_envs.overcooked.layout import INGREDIENTS
 from legible_envs.overcooked.recipes import Recipe
 from legible_envs.overcooked.rendering.actors import draw_tick
 from legible_envs.overcooked.rendering.food import draw_pieces
 from legible_envs.overcooked.rendering.palette import PALETTE
-from legible_envs.overcooked.view import GameView
 
 __all__ = ["draw_hud", "hud_height"]
 

@@ -21,7 +21,7 @@ from legible_envs.tabletop.task import TabletopTask
 from legible_envs.tasks import TaskGraph
 
 if TYPE_CHECKING:
-    from legible_envs.tabletop.scoring import TabletopScorer
+    from legible_envs.tabletop.scoring.scorer import TabletopScorer
 
 __all__ = ["draw_boards", "draw_configuration", "stage_of"]
 
@@ -93,7 +93,7 @@ def _caption(layout: TabletopLayout, task: TabletopTask, scorer: TabletopScorer 
 
 @cache
 def _default_scorer(task: TabletopTask) -> TabletopScorer:
-    from legible_envs.tabletop.scoring import TabletopScorer
+    from legible_envs.tabletop.scoring.scorer import TabletopScorer
 
     return TabletopScorer(task)
 

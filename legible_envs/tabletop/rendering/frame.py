@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from legible_envs.tabletop.things import Table
+from legible_envs.tabletop.objects import Table
 
 __all__ = ["Frame", "check_width"]
 

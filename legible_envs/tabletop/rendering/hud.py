@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from legible_envs.drawing.canvas import Image, Sprite, mix, paste, rgb, text_sprite
 from legible_envs.drawing.sheets import fit_text
+from legible_envs.tabletop.game.view import TableView
 from legible_envs.tabletop.rendering.palette import TABLE
-from legible_envs.tabletop.view import TableView
 
 __all__ = ["draw_hud", "hud_height", "robot_words"]
 

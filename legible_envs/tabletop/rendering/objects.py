@@ -9,10 +9,10 @@ from typing import Final
 import numpy as np
 
 from legible_envs.drawing.canvas import Canvas, Image, Sprite, mix, paste, text_sprite
+from legible_envs.tabletop.objects import TableObject
 from legible_envs.tabletop.rendering.frame import Frame
 from legible_envs.tabletop.rendering.glyphs import draw_glyph, initial
 from legible_envs.tabletop.rendering.palette import TABLE, hex_of, ink_on
-from legible_envs.tabletop.things import TableObject
 
 __all__ = ["colour_of", "outline", "paste_centred", "paste_object"]
 

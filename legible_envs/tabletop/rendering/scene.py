@@ -8,13 +8,13 @@ from typing import Final
 import numpy as np
 
 from legible_envs.drawing.canvas import Image, rgb
+from legible_envs.tabletop.game.view import STATUSES, TableView
 from legible_envs.tabletop.rendering.actors import dot_sprite, gripper_sprite, hand_sprite, ring_sprite
 from legible_envs.tabletop.rendering.frame import Frame, check_width
 from legible_envs.tabletop.rendering.hud import draw_hud, hud_height
 from legible_envs.tabletop.rendering.objects import paste_centred, paste_object
 from legible_envs.tabletop.rendering.palette import TABLE
 from legible_envs.tabletop.rendering.surface import surface_of
-from legible_envs.tabletop.view import STATUSES, TableView
 
 __all__ = ["draw_scene", "scene_shape"]
 

@@ -10,12 +10,12 @@ import numpy as np
 
 from legible_envs.drawing.canvas import Canvas, Image, mix, paste, rgb
 from legible_envs.tabletop.layout import TabletopLayout
+from legible_envs.tabletop.objects import Table, VirtualObstacle
 from legible_envs.tabletop.rendering.frame import Frame
 from legible_envs.tabletop.rendering.glyphs import draw_glyph
 from legible_envs.tabletop.rendering.objects import colour_of, outline
 from legible_envs.tabletop.rendering.palette import TABLE
 from legible_envs.tabletop.task import TabletopTask
-from legible_envs.tabletop.things import Table, VirtualObstacle
 
 __all__ = ["surface_of"]
 

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from legible_envs.overcooked import OvercookedLayout
-from legible_envs.overcooked.replay import GameArrays, predict_transitions
+from legible_envs.overcooked.game.replay import GameArrays, predict_transitions
 
 DIRECTIONS = ([0, -1], [0, 1], [1, 0], [-1, 0], [0, 0], "INTERACT")
 ITEM_NAMES = {2: "onion", 5: "dish", 6: "soup"}

@@ -18,8 +18,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from legible_envs.overcooked import OvercookedLayout
-from legible_envs.overcooked.recordings import (
+from legible_envs.datasets.overcooked_2019 import (
     GAMES_FILE,
     RecordedGame,
     RecordingsError,
@@ -31,10 +30,11 @@ from legible_envs.overcooked.recordings import (
     recordings_folder,
     source,
 )
-from legible_envs.overcooked.recordings.games import read_games
-from legible_envs.overcooked.recordings.source import PipSettings, download_archive, read_archive, read_members
-from legible_envs.overcooked.recordings.unpickle import ADMITTED, read_table
-from legible_envs.overcooked.replay import GameArrays, predict_transitions
+from legible_envs.datasets.overcooked_2019.games import read_games
+from legible_envs.datasets.overcooked_2019.source import PipSettings, download_archive, read_archive, read_members
+from legible_envs.datasets.overcooked_2019.unpickle import ADMITTED, read_table
+from legible_envs.overcooked import OvercookedLayout
+from legible_envs.overcooked.game.replay import GameArrays, predict_transitions
 from legible_envs.rollouts import load_trajectories
 from tests.legible_envs.datasets.old_pickles import Call, archive, array, dumps, named, simulated_table, table_pickle
 
@@ -121,10 +121,10 @@ def test_walks_and_counts_of_a_local_copy(published: Path, tmp_path: Path) -> No
 
 
 def test_candidates_of_the_game_are_those_of_the_dynamics(published: Path, tmp_path: Path) -> None:
-    from legible_envs.overcooked.goals import find_goals
-    from legible_envs.overcooked.recordings.walks import _valid_goals
-    from legible_envs.overcooked.replay import _pack
-    from legible_envs.overcooked.rules import OVERCOOKED_AI_2019, pack_kitchen, pack_rules
+    from legible_envs.datasets.overcooked_2019.walks import _valid_goals
+    from legible_envs.overcooked.game.goals import find_goals
+    from legible_envs.overcooked.game.replay import _pack
+    from legible_envs.overcooked.game.rules import OVERCOOKED_AI_2019, pack_kitchen, pack_rules
 
     compared = 0
     for game in load_recorded_games(fetch_recordings(tmp_path / "out", source=published)):
@@ -287,7 +287,7 @@ def test_tables_are_rebuilt_without_their_libraries() -> None:
         b"b",
         state=(1, (2, 2), Call(named("numpy", "dtype"), "i8", 0, 1, state=(3, "<")), True, np.arange(4).tobytes()),
     )
-    from legible_envs.overcooked.recordings.unpickle import _array, _Reader
+    from legible_envs.datasets.overcooked_2019.unpickle import _array, _Reader
 
     assert _array(_Reader(dumps(fortran)).load()).tolist() == [[0, 2], [1, 3]]
     assert _array(_Reader(dumps(array([[True], [False]], "b1"))).load()).tolist() == [[True], [False]]
@@ -333,7 +333,7 @@ def test_hostile_pickles_are_refused_and_nothing_runs(tmp_path: Path) -> None:
 def test_admitted_names_are_never_imported() -> None:
     program = (
         "import sys\n"
-        "from legible_envs.overcooked.recordings.unpickle import ADMITTED, _Reader\n"
+        "from legible_envs.datasets.overcooked_2019.unpickle import ADMITTED, _Reader\n"
         "reader = _Reader(b'')\n"
         "found = [reader.find_class(*name) for name in ADMITTED]\n"
         "assert all(type(f.__new__(f)).__mro__[1].__name__ == '_Record' for f in found)\n"
@@ -368,7 +368,7 @@ def test_damaged_pickles_never_do_anything_but_fail(data: st.DataObject) -> None
     ],
 )
 def test_rows_that_are_no_ticks_are_named(tables: dict[str, Any], column: str, value: str, message: str) -> None:
-    from legible_envs.overcooked.recordings.convert import convert_tables
+    from legible_envs.datasets.overcooked_2019.convert import convert_tables
 
     table = {key: np.array(values, dtype=object) for key, values in tables["test"].items()}
     table["time_elapsed"] = table["time_elapsed"].astype(float)

@@ -12,14 +12,14 @@ import pytest
 from legible_envs import LayoutError
 from legible_envs.legibility import From, prefix_weights
 from legible_envs.overcooked import OvercookedLayout, OvercookedWorkspace
-from legible_envs.overcooked.boltzmann import (
+from legible_envs.overcooked.scoring.boltzmann import (
     DEFAULT_RATIONALITY,
     boltzmann_legibility,
     boltzmann_walks,
     check_human,
     step_probabilities,
 )
-from legible_envs.overcooked.scoring import ambiguity, explain_layout, grid_graph, score_layout
+from legible_envs.overcooked.scoring.explanation import ambiguity, explain_layout, grid_graph, score_layout
 from legible_envs.tasks import Subtask, TaskGraph
 from legible_envs.workspace import check_workspace, make_workspace
 from tests.legible_envs.overcooked.kitchens import all_shortest_walks, random_kitchen, steps_between

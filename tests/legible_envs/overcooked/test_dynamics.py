@@ -13,11 +13,11 @@ import pytest
 
 from legible_envs.errors import LayoutError, TaskError
 from legible_envs.overcooked import OvercookedLayout
-from legible_envs.overcooked.dynamics import interaction, is_over, start, step
-from legible_envs.overcooked.goals import find_actions, find_goals
-from legible_envs.overcooked.replay import GameArrays, _unpack, predict_transitions
-from legible_envs.overcooked.rules import LEGIBLE, OVERCOOKED_AI_2019, GameRules, pack_kitchen, pack_rules
-from legible_envs.overcooked.vectors import AT_PLAYERS, DISHES_OUT, NOTHING_HAPPENS, SOUPS_IN_POTS
+from legible_envs.overcooked.game.dynamics import interaction, is_over, start, step
+from legible_envs.overcooked.game.goals import find_actions, find_goals
+from legible_envs.overcooked.game.replay import GameArrays, _unpack, predict_transitions
+from legible_envs.overcooked.game.rules import LEGIBLE, OVERCOOKED_AI_2019, GameRules, pack_kitchen, pack_rules
+from legible_envs.overcooked.game.vectors import AT_PLAYERS, DISHES_OUT, NOTHING_HAPPENS, SOUPS_IN_POTS
 from tests.oracles.kitchen_oracle import KernelGame, OracleGame, any_kitchen
 
 N, S, E, W, STAY, INTERACT = range(6)
@@ -278,7 +278,7 @@ def test_replay_names_the_array_that_does_not_fit():
 PLAIN_PYTHON = """
 import numpy as np
 from tests.oracles.kitchen_oracle import KernelGame, OracleGame, any_kitchen
-from legible_envs.overcooked.dynamics import (step)
+from legible_envs.overcooked.game.dynamics import (step)
 rng = np.random.default_rng(0)
 for players in (1, 2):
     layout = any_kitchen(rng, players)

@@ -23,9 +23,9 @@ import legible_envs  # noqa: F401
 from legible_envs.errors import LayoutError, TaskError
 from legible_envs.overcooked import PAPER_SOUPS, OvercookedLayout, OvercookedWorkspace
 from legible_envs.overcooked.env import OvercookedEnv
-from legible_envs.overcooked.observations import GRID_CHANNELS, NUM_FEATURES
+from legible_envs.overcooked.game.observations import GRID_CHANNELS, NUM_FEATURES
+from legible_envs.overcooked.layouts import read_layout
 from legible_envs.overcooked.policies import ScriptedPlayer
-from legible_envs.overcooked.settings import read_layout
 from tests.oracles.kitchen_oracle import any_kitchen
 
 NAME = "LegibleOvercooked-v0"

@@ -9,7 +9,7 @@ import pytest
 
 from legible_envs.errors import LayoutError
 from legible_envs.overcooked import PAPER_SOUPS, OvercookedLayout
-from legible_envs.overcooked.play import Played, load_played, play, recipes_for
+from legible_envs.overcooked.human_play import Played, load_played, play, recipes_for
 
 # Facing west at the start: onion, pot and hatch are one turn away.
 TINY = "XPX\nO1S\nXDX"

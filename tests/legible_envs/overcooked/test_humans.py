@@ -15,9 +15,9 @@ from scipy.stats import chisquare
 
 import legible_envs  # noqa: F401
 from legible_envs import LayoutError
+from legible_envs.datasets.overcooked_2019 import RecordingsError, recorded_trajectories
 from legible_envs.legibility import From, env_legibility, optimal_costs, prefix_weights
 from legible_envs.overcooked import OvercookedLayout, soup_task
-from legible_envs.overcooked.boltzmann import boltzmann_legibility, boltzmann_walks
 from legible_envs.overcooked.humans import (
     BoltzmannWalker,
     PlannerWalker,
@@ -25,9 +25,9 @@ from legible_envs.overcooked.humans import (
     rationality_spread,
     simulate_participants,
 )
-from legible_envs.overcooked.recordings import RecordingsError, recorded_trajectories
-from legible_envs.overcooked.scoring import grid_graph
-from legible_envs.overcooked.walks import record_episode
+from legible_envs.overcooked.scoring.boltzmann import boltzmann_legibility, boltzmann_walks
+from legible_envs.overcooked.scoring.explanation import grid_graph
+from legible_envs.overcooked.trajectories import record_episode
 from legible_envs.rollouts import Trajectory
 from legible_envs.tasks import Subtask, TaskGraph
 from predictors import BayesianGoalPredictor

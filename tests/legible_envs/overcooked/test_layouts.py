@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import legible_envs  # noqa: F401
 from legible_envs.errors import LayoutError
 from legible_envs.overcooked import OvercookedLayout, OvercookedWorkspace
-from legible_envs.overcooked.distribution import LayoutSet, RandomLayouts, default_layout, read_distribution
+from legible_envs.overcooked.layouts import LayoutSet, RandomLayouts, default_layout, read_distribution
 
 NAME = "LegibleOvercooked-v0"
 

@@ -21,7 +21,13 @@ from legible_envs.legibility import (
     tied_goals,
 )
 from legible_envs.overcooked import OvercookedLayout, OvercookedWorkspace
-from legible_envs.overcooked.scoring import ambiguity, explain_layout, grid_graph, layout_distance, score_layout
+from legible_envs.overcooked.scoring.explanation import (
+    ambiguity,
+    explain_layout,
+    grid_graph,
+    layout_distance,
+    score_layout,
+)
 from legible_envs.tasks import Subtask, TaskGraph
 from tests.legible_envs.overcooked.kitchens import brute_force_legibility, brute_force_reach, random_kitchen
 from tests.support.plain_python import printed_both_ways

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from legible_envs.overcooked import OvercookedLayout
+from legible_envs.overcooked.game.view import GameView, Item, PlayerView, PotView
 from legible_envs.overcooked.layout import STATION_TYPES, SYMBOLS
 from legible_envs.overcooked.rendering import (
     HEAT,
@@ -27,7 +28,6 @@ from legible_envs.overcooked.rendering import (
     save_png,
 )
 from legible_envs.overcooked.rendering.hud import tickets_of
-from legible_envs.overcooked.view import GameView, Item, PlayerView, PotView
 
 KITCHEN = OvercookedLayout.from_ascii("XPXXTXX\nO     X\nX VV  D\nX  V  X\nC   V X\nX1    X\nXSXFXXX")
 POT = (0, 1)

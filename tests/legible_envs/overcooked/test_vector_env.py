@@ -114,7 +114,7 @@ def test_same_trajectories_as_sync(mode, setting):
 
 def full_infos(envs):
     masks = np.zeros((COUNT, 6), dtype=np.int8)
-    from legible_envs.overcooked.goals import find_actions
+    from legible_envs.overcooked.game.goals import find_actions
 
     for i, (state, kitchen, rules) in enumerate(envs.call("arrays")):
         find_actions(state, kitchen, rules, 0, masks[i])

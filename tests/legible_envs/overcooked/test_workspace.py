@@ -320,7 +320,7 @@ def test_configuration_round_trips(arguments):
 
 def test_workspaces_by_name():
     assert make_workspace("overcooked", shape=(5, 5)).shape == (5, 5)
-    assert make_workspace("legible_envs.overcooked.workspace:OvercookedWorkspace").shape == (7, 7)
+    assert make_workspace("legible_envs.overcooked.design.workspace:OvercookedWorkspace").shape == (7, 7)
 
     class Tiny(OvercookedWorkspace):
         name = "tiny"

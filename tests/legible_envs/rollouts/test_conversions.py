@@ -13,12 +13,20 @@ from hypothesis import strategies as st
 
 import legible_envs  # noqa: F401
 from legible_envs.errors import LayoutError
+from legible_envs.overcooked.human_play import Played
 from legible_envs.overcooked.layout import OvercookedLayout
-from legible_envs.overcooked.play import Played
 from legible_envs.overcooked.policies import ScriptedPlayer
-from legible_envs.overcooked.walks import record_episode
-from legible_envs.rollouts import Trajectory, save_trajectories
-from legible_envs.rollouts_io import RecordRollouts, read_any, read_csv, to_minari, trajectories_from_played, write_csv
+from legible_envs.overcooked.trajectories import record_episode
+from legible_envs.rollouts import (
+    RecordRollouts,
+    Trajectory,
+    read_any,
+    read_csv,
+    save_trajectories,
+    to_minari,
+    trajectories_from_played,
+    write_csv,
+)
 from legible_envs.tabletop import TableObject, TabletopLayout, VirtualObstacle
 
 KITCHEN = OvercookedLayout.from_ascii("XOXTX\nX   X\nX   D\nX 1 X\nXXSPX")

@@ -17,7 +17,12 @@ from hypothesis import strategies as st
 import legible_envs
 from legible_envs.overcooked import OvercookedLayout
 from legible_envs.overcooked.policies import ScriptedPlayer
-from legible_envs.overcooked.walks import dispensers_in_reach, find_walks, record_episode, trajectories_from_views
+from legible_envs.overcooked.trajectories import (
+    dispensers_in_reach,
+    find_walks,
+    record_episode,
+    trajectories_from_views,
+)
 from legible_envs.rollouts import (
     CUTS,
     Trajectory,

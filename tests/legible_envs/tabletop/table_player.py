@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from legible_envs.tabletop.robot import Command
+from legible_envs.tabletop.partner.interface import Command
 
 SPEED = 1.2
 

@@ -11,7 +11,7 @@ from legible_envs.errors import LayoutError
 from legible_envs.legibility import posterior
 from legible_envs.rollouts import Trajectory
 from legible_envs.tabletop import TableObject, TabletopLayout, TabletopTask, VirtualObstacle
-from legible_envs.tabletop.belief import EqOne, EqOneBelief
+from legible_envs.tabletop.partner.belief import EqOne, EqOneBelief
 from tests.oracles.table_oracle import PathOracle
 
 HOME = (0.60, 0.05)

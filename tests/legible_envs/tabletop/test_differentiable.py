@@ -8,7 +8,7 @@ import pytest
 
 from legible_envs.overcooked import OvercookedWorkspace
 from legible_envs.tabletop import TabletopScorer, TabletopWorkspace
-from legible_envs.tabletop.differentiable import DifferentiableTable
+from legible_envs.tabletop.design.differentiable import DifferentiableTable
 from legible_envs.workspace import check_workspace, make_workspace
 from optimizers import EmitterError, check_emitter, search
 from optimizers.archives import archive_arrays

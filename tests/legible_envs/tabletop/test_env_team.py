@@ -11,8 +11,8 @@ import pytest
 import legible_envs  # noqa: F401
 from legible_envs.errors import LayoutError
 from legible_envs.rollouts import load_trajectories, save_trajectories
-from legible_envs.tabletop.belief import EqOneBelief
-from legible_envs.tabletop.recording import RecordReaches
+from legible_envs.rollouts.recording import RecordReaches
+from legible_envs.tabletop.partner.belief import EqOneBelief
 from tests.legible_envs.tabletop.table_envs import APART, FIRST, SECOND, TASK, WALL, make
 from tests.legible_envs.tabletop.table_player import (
     Doubtful,

@@ -12,7 +12,7 @@ import pytest
 from legible_envs.rollouts import Trajectory
 from legible_envs.tabletop import TabletopLayout, TabletopTask, VirtualObstacle
 from legible_envs.tabletop.humans import Person, ReachModel, simulate_participants, simulate_reach
-from legible_envs.tabletop.reach_fitting import fit_reaches
+from legible_envs.tabletop.humans.fitting import fit_reaches
 from predictors import StraightLineBayesian
 from predictors.base import FRACTIONS, correctness
 from tests.support.pointing import load_pointing, needs_pointing

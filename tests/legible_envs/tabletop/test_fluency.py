@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from legible_envs.tabletop.fluency import TeamMetrics, Tick, tick_of
-from legible_envs.tabletop.robot import Command, Senses
+from legible_envs.tabletop.partner.fluency import TeamMetrics, Tick, tick_of
+from legible_envs.tabletop.partner.interface import Command, Senses
 
 
 def measured(log, end=None):

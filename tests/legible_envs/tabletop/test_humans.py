@@ -14,7 +14,7 @@ from scipy.stats import kstest
 from legible_envs.errors import LayoutError
 from legible_envs.rollouts import Trajectory, load_trajectories, save_trajectories
 from legible_envs.tabletop import TableObject, TabletopLayout, TabletopTask, VirtualObstacle
-from legible_envs.tabletop.belief import EqOneBelief
+from legible_envs.tabletop.design.workspace import TabletopWorkspace
 from legible_envs.tabletop.humans import (
     Person,
     ReachModel,
@@ -24,7 +24,7 @@ from legible_envs.tabletop.humans import (
     simulate_reach,
     simulate_task,
 )
-from legible_envs.tabletop.workspace import TabletopWorkspace
+from legible_envs.tabletop.partner.belief import EqOneBelief
 from predictors import (
     BayesianGoalPredictor,
     ShortestDistance,

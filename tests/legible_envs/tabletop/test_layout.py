@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 
 from legible_envs.errors import LayoutError, TaskError
 from legible_envs.tabletop import Table, TableObject, TabletopLayout, TabletopTask, VirtualObstacle
+from legible_envs.tabletop.objects import rectangle, rectangles_overlap
 from legible_envs.tabletop.task import task_names
-from legible_envs.tabletop.things import rectangle, rectangles_overlap
 
 finite = st.floats(-5, 5)
 sizes = st.tuples(st.floats(0.001, 2), st.floats(0.001, 2))

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from legible_envs.errors import LayoutError, TaskError
 from legible_envs.tabletop import TableObject, TabletopLayout, TabletopTask, VirtualObstacle
-from legible_envs.tabletop.evidence import exponentials
-from legible_envs.tabletop.scoring import TabletopScorer
+from legible_envs.tabletop.scoring.posterior_kernels import exponentials
+from legible_envs.tabletop.scoring.scorer import TabletopScorer
 from legible_envs.tasks import Subtask, TaskGraph
 from tests.oracles.table_oracle import PathOracle, legibility
 from tests.support.plain_python import printed_both_ways
@@ -311,7 +311,7 @@ def test_exponentials_are_exact_enough():
 
 def test_kernels_run_as_plain_python():
     code = (
-        "from legible_envs.tabletop.scoring import TabletopScorer;"
+        "from legible_envs.tabletop.scoring.scorer import TabletopScorer;"
         "from legible_envs.tabletop import VirtualObstacle;"
         "s = TabletopScorer('tea');"
         "o = [VirtualObstacle((0.45, 0.2), 0.3), VirtualObstacle((0.85, 0.5), 1.5)];"

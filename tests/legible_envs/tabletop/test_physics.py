@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from shapely import LineString, Point, Polygon
 
 from legible_envs.tabletop import TableObject, TabletopLayout, VirtualObstacle
-from legible_envs.tabletop.motion import count_entered, slide, touch_distances
-from legible_envs.tabletop.paths import ShortestPaths
-from legible_envs.tabletop.physics import TablePhysics
-from legible_envs.tabletop.things import rectangle
+from legible_envs.tabletop.game.physics import TablePhysics
+from legible_envs.tabletop.geometry.motion_kernels import count_entered, slide, touch_distances
+from legible_envs.tabletop.geometry.paths import ShortestPaths
+from legible_envs.tabletop.objects import rectangle
 
 SIZE = (1.2, 0.8)
 DT = 1 / 30
@@ -294,7 +294,7 @@ def test_copies_in_the_middle_of_a_push_go_on_exactly_alike(copier):
 
 
 def test_long_histories_are_forgotten_at_rest(monkeypatch):
-    monkeypatch.setattr("legible_envs.tabletop.physics.LOG_LIMIT", 50)
+    monkeypatch.setattr("legible_envs.tabletop.game.physics.LOG_LIMIT", 50)
     worlds = physics_of(crowd()), physics_of(crowd())
     for physics in worlds:
         stir(physics, 60, 0)

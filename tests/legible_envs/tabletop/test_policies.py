@@ -11,7 +11,7 @@ import pytest
 import legible_envs
 from legible_envs.tabletop import TabletopLayout, TabletopTask, VirtualObstacle
 from legible_envs.tabletop.humans import Person, ReachModel, sample_person
-from legible_envs.tabletop.reaching_player import ReachingPlayer
+from legible_envs.tabletop.policies import ReachingPlayer
 from predictors import StraightLineBayesian
 
 assert legible_envs

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from legible_envs.drawing.canvas import rgb
 from legible_envs.legibility import posterior
 from legible_envs.tabletop import TableObject, TabletopLayout, TabletopTask, VirtualObstacle
+from legible_envs.tabletop.game.view import TableView
 from legible_envs.tabletop.rendering import (
     draw_boards,
     draw_configuration,
@@ -27,7 +28,6 @@ from legible_envs.tabletop.rendering.doubt import along, doubtful_reaches
 from legible_envs.tabletop.rendering.frame import Frame
 from legible_envs.tabletop.rendering.glyphs import GLYPHS, initial
 from legible_envs.tabletop.rendering.palette import NAMED, TABLE, hex_of, ink_on
-from legible_envs.tabletop.view import TableView
 
 TASK = TabletopTask.named("columns")
 TABLES = TASK.layout
@@ -324,7 +324,7 @@ def test_boards_show_every_layout_and_the_configuration() -> None:
 
 def test_captions_are_the_scores_of_the_layouts() -> None:
     from legible_envs.tabletop.rendering.boards import _caption
-    from legible_envs.tabletop.scoring import TabletopScorer
+    from legible_envs.tabletop.scoring.scorer import TabletopScorer
 
     scores = TabletopScorer(TASK).layout(WALLED)
     assert f"legibility {scores.legibility[0]:.2f}" in _caption(WALLED, TASK, None).replace("\u2212", "-")
@@ -352,7 +352,7 @@ def test_drawing_opens_no_window_and_leaves_the_environment_alone() -> None:
         before = dict(os.environ)
         from legible_envs.tabletop import TabletopTask
         from legible_envs.tabletop.rendering import draw_scene
-        from legible_envs.tabletop.view import TableView
+        from legible_envs.tabletop.game.view import TableView
         task = TabletopTask.named("tea")
         draw_scene(TableView.at_rest(task.layout, task), width=200)
         import pygame

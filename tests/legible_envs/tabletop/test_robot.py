@@ -12,9 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from legible_envs.tabletop import TableObject, TabletopLayout, TabletopTask, VirtualObstacle
-from legible_envs.tabletop.belief import EqOneBelief
-from legible_envs.tabletop.robot import RobotPartner, Senses
-from legible_envs.tabletop.steering import Steering
+from legible_envs.tabletop.partner.belief import EqOneBelief
+from legible_envs.tabletop.partner.interface import Senses
+from legible_envs.tabletop.partner.robot import RobotPartner
+from legible_envs.tabletop.partner.steering import Steering
 from tests.legible_envs.tabletop.table_team import RATE, Team
 
 COLUMNS = TabletopTask.named("columns")
@@ -625,7 +626,7 @@ def test_teams_of_simulated_people_and_robots_finish_in_the_environment(argument
     import gymnasium as gym
 
     from legible_envs.tabletop.humans import sample_person
-    from legible_envs.tabletop.reaching_player import ReachingPlayer
+    from legible_envs.tabletop.policies import ReachingPlayer
 
     env = gym.make("legible_envs:LegibleTabletop-v0", **arguments)
     by_robot = 0

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from legible_envs import LayoutError, TaskError
 from legible_envs.tabletop import TableObject, TabletopLayout, TabletopTask, TabletopWorkspace, VirtualObstacle
-from legible_envs.tabletop.genomes import half_turn
-from legible_envs.tabletop.measures import greatest_spacing, least_distances, order_ranks
+from legible_envs.tabletop.design.genome_kernels import half_turn
+from legible_envs.tabletop.design.measures import greatest_spacing, least_distances, order_ranks
 from legible_envs.tasks import Subtask, TaskGraph
 from legible_envs.workspace import check_workspace, make_workspace
 from tests.oracles.table_oracle import legibility

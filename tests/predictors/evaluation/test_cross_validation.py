@@ -17,9 +17,9 @@ from predictors import ShortestDistance
 from predictors.base import GoalPredictor
 from predictors.checks import example_walks
 from predictors.evaluation import accuracy_at, compare_conditions, evaluate, learning_curve
-from predictors.metrics import calibration_error, clustered_interval, log_loss, tied_shares, weighted_scores
+from predictors.evaluation.metrics import calibration_error, clustered_interval, log_loss, tied_shares, weighted_scores
+from predictors.evaluation.splits import folds
 from predictors.registry import PredictorError
-from predictors.splits import folds
 
 KITCHEN = OvercookedLayout.from_ascii("XOXTX\nX   X\nX   D\nX   X\nXXSPX")
 GOALS = ("onion", "tomato", "dish")
@@ -396,7 +396,7 @@ def test_the_examples_of_the_contract_can_be_evaluated() -> None:
 
 @pytest.mark.data
 def test_recorded_people_are_read_as_measured_before() -> None:
-    from legible_envs.overcooked.recordings import RecordingsError, recorded_trajectories
+    from legible_envs.datasets.overcooked_2019 import RecordingsError, recorded_trajectories
 
     try:
         walks = recorded_trajectories(None, ["cramped_room"])

@@ -11,7 +11,7 @@ import pytest
 from scipy import stats
 
 from predictors.evaluation import compare_conditions
-from predictors.statistics import holm, tukey_half_width
+from predictors.evaluation.statistics import holm, tukey_half_width
 
 
 def between(rng: np.random.Generator, sizes: tuple[int, ...], shift: float = 0.1, rows: int = 4) -> pd.DataFrame:

@@ -1,0 +1,1 @@
+"""The command ``legible``, a file per group of commands."""

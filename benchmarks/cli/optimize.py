@@ -1,0 +1,166 @@
+"""Searches started from the command line: progress, Ctrl-C, and the pictures that belong in every run folder."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Collection, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from benchmarks.console import number
+from benchmarks.presenters.base import Part, Presenter, presenter_of
+from benchmarks.runs import RunError, is_run_folder, read_config
+
+if TYPE_CHECKING:
+    from optimizers import SearchResult
+
+__all__ = ["check_options", "default_folder", "emitter_rows", "run_search", "write_pictures"]
+
+
+def default_folder(domain: str, settings: Mapping[str, Any]) -> Path:
+    """Where a search is written that names no folder."""
+    if settings.get("start_from"):
+        return Path("runs") / f"{domain}-from-{Path(settings['start_from']).stem}-seed{settings['seed']}"
+    return Path("runs") / f"{domain}-{presenter_of(domain).folder_name(settings)}-seed{settings['seed']}"
+
+
+def check_options(domain: str, given: Collection[str]) -> None:
+    """Refuse options that are about another workspace.
+
+    Raises:
+        click.UsageError: One was given.
+    """
+    from benchmarks.presenters.base import DOMAINS
+
+    for other in DOMAINS:
+        if other != domain:
+            wrong = sorted((presenter_of(other).options - presenter_of(domain).options) & set(given))
+            if wrong:
+                thing = presenter_of(other).thing
+                raise click.UsageError(f"--{wrong[0].replace('_', '-')} is about a {thing}, not about {domain}")
+
+
+def run_search(domain: str, out: Path, settings: Mapping[str, Any], given: Collection[str]) -> None:
+    """Search, then write ``best.png`` and ``report.html`` beside what the search itself writes.
+
+    Args:
+        domain: Name of the workspace.
+        out: Folder of the run.
+        settings: Options of ``legible optimize``.
+        given: Names of those that the user gave; the others do not count where a search is continued.
+
+    Raises:
+        RunError: The folder already holds a run, and nobody said what to do with it, or none to be continued.
+        SearchError: Its checkpoint cannot be continued, or the search cannot go on.
+    """
+    presenter = presenter_of(domain)
+    if is_run_folder(out) and not (settings["resume"] or settings["overwrite"]):
+        raise RunError(
+            f"{out} already holds a search: add --resume to continue it, --overwrite to replace it, or choose another "
+            "folder with --out"
+        )
+    config: dict[str, Any] = {"workspace": domain}
+    if settings["resume"]:
+        before = read_config(out / "config.json")
+        config = dict(before["workspace"])
+        if config.get("workspace") != domain:
+            raise RunError(f"{out} holds a search of {config.get('workspace')!r}, not of {domain!r}")
+        settings = _continued(before, settings, given)
+    parts = presenter.parts({**config, **presenter.design(settings)}, settings, out)
+    results = [_search_part(domain, presenter, part, settings, out) for part in parts]
+    _tell(presenter, results[0], parts)
+
+
+def _continued(before: Mapping[str, Any], settings: Mapping[str, Any], given: Collection[str]) -> dict[str, Any]:
+    """Settings of a search that is continued: its own, except those given anew (which it may refuse)."""
+    always = {"resume", "overwrite", "quiet"}
+    kept = {name: value for name, value in settings.items() if name in given or name in always}
+    emitter = before["emitter"]
+    own: dict[str, Any] = {
+        "objective": before["objective"]["name"],
+        "max_distance": before["objective"].get("max_distance"),
+        "emitter": [one["name"] for one in emitter] if isinstance(emitter, list) else emitter["name"],
+        "seed": before.get("seed", settings["seed"]),
+    }
+    if not {"evaluations", "iterations"} & set(given):
+        own |= {"evaluations": before.get("evaluations"), "iterations": before.get("iterations")}
+    return {"evaluations": None, "iterations": None, **own, **kept}
+
+
+def _search_part(domain: str, presenter: Presenter, part: Part, settings: Mapping[str, Any], out: Path) -> SearchResult:
+    """One search of one folder."""
+    from optimizers import SearchInterrupted, search
+
+    if part.title and not settings["quiet"]:
+        click.echo(part.title, err=True)
+    iterations = settings.get("iterations")
+    try:
+        result = search(
+            part.workspace,
+            objective=settings["objective"],
+            max_distance=settings["max_distance"],
+            emitter=settings["emitter"],
+            evaluations=settings["evaluations"],
+            iterations=None if iterations is None else (int(iterations[0]), int(iterations[1])),
+            seed=settings["seed"],
+            checkpoint=part.folder,
+            resume=("auto" if part.title else True) if settings["resume"] else False,
+            overwrite=settings["overwrite"],
+            progress=False if settings["quiet"] else None,
+        )
+    except SearchInterrupted as stop:
+        done = 0 if stop.partial is None else stop.partial.evaluations
+        click.echo(f"stopped after {done:,} evaluations; everything is saved in {out}", err=True)
+        if stop.partial is not None and stop.partial.best_genome is not None:
+            write_pictures(part.folder)
+        click.echo(f"to go on: legible optimize {domain} --resume --out {shlex.quote(str(out))}", err=True)
+        raise click.exceptions.Exit(130) from None
+    if result.best_genome is None:
+        click.echo(f"no layout scored in {result.evaluations:,} evaluations; is --max-distance too low?", err=True)
+        raise click.exceptions.Exit(1)
+    if part.folder != out:
+        write_pictures(part.folder)
+    return result
+
+
+def _tell(presenter: Presenter, result: SearchResult, parts: Collection[Part]) -> None:
+    """Say what the search of the folder itself found, and where everything lies."""
+    from benchmarks.console import say
+
+    assert result.folder is not None
+    written = write_pictures(result.folder)
+    console = say()
+    console.print(presenter.text(console, result.best_layout))
+    summary, unit = result.workspace.summary(result.best_genome), presenter.words["distance_unit"]
+    console.print(
+        f"{result.config['objective']['name']} {number(result.best_objective, 4)} "
+        f"(legibility {number(summary['score'])}, distance {number(summary['distance'], 1)} {unit}) "
+        f"after {result.evaluations:,} evaluations in {result.seconds:.1f} s"
+    )
+    for name, path in written.items():
+        console.print(f"{name:<8}{path}", soft_wrap=True)
+    if len(parts) > 1:
+        console.print(f"each of the {len(parts)} searches has a folder of its own there", style="dim")
+
+
+def write_pictures(folder: Path) -> dict[str, Path]:
+    """Write pictures and report of a run; what was written, by what it is."""
+    from benchmarks.reports.search_report import write_best_image, write_report
+    from benchmarks.runs import read_run
+
+    written, run = {"picture": write_best_image(folder)}, read_run(folder)
+    if (boards := presenter_of(str(run.config["workspace"]["workspace"])).write_boards(run)) is not None:
+        written["boards"] = boards
+    return {**written, "report": write_report(folder)}
+
+
+def emitter_rows() -> list[dict[str, Any]]:
+    """A row per emitter that can be named: its name, where it comes from, and what it is."""
+    from optimizers import list_emitters
+
+    return [
+        {"name": info.name, "from": info.origin, "class": info.target, "what": info.summary()}
+        for info in list_emitters().values()
+    ]

@@ -1,0 +1,158 @@
+"""``legible reproduce``: the paper's experiments, and those it could not make."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from benchmarks.reports.experiment_report import Section
+    from benchmarks.trials import Event
+
+__all__ = ["EXPERIMENTS", "Experiment", "reproduce", "run_experiment"]
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """An experiment that one command runs.
+
+    Attributes:
+        modules: Its parts by the folder each writes to; a part offers ``reproduce(folder, *, quick, seeds, workers,
+            scheduler, progress)`` and, in ``analysis``, ``sections(folder)``.
+        title: Of its report.
+        lede: Below the title.
+    """
+
+    modules: Mapping[str, str]
+    title: str
+    lede: str
+
+
+_PEOPLE = "People are simulated or recorded here, not the paper's participants."
+
+EXPERIMENTS: Final = {
+    "overcooked": Experiment(
+        {".": "benchmarks.experiments.overcooked", "recorded": "benchmarks.experiments.recorded"},
+        "Are legible kitchens read better?",
+        "Random, efficient, legible-efficient and legible kitchens, and who can tell early what a cook reaches for. "
+        f"{_PEOPLE}",
+    ),
+    "tabletop": Experiment(
+        {".": "benchmarks.experiments.tabletop"},
+        "Are legible tables read better, and does a robot profit?",
+        "Sorted cubes, better places, virtual obstacles, and both; read by predictors, then shared with a robot. "
+        f"{_PEOPLE}",
+    ),
+    "optimizers": Experiment(
+        {".": "benchmarks.experiments.optimizers"},
+        "Which search finds the most legible kitchens?",
+        "Emitters under the same scheduler, at the paper's number of iterations and at equal numbers of evaluations.",
+    ),
+}
+
+
+def run_experiment(
+    name: str,
+    folder: Path,
+    *,
+    quick: bool = False,
+    seeds: int | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    progress: Callable[[Event], object] | None = None,
+) -> Path:
+    """Run what has not been run yet, analyse all of it, and write the report.
+
+    Args:
+        name: One of :data:`EXPERIMENTS`.
+        folder: Where results, tables, figures and ``report.html`` are written.
+        quick: The version of two minutes.
+        seeds: How many seeds in place of the experiment's own number.
+        workers: Processes on this machine; all cores if None.
+        scheduler: Address of a Dask scheduler instead.
+        progress: Called with an :class:`~benchmarks.trials.Event` whenever something changes.
+
+    Returns:
+        The report.
+    """
+    from benchmarks.reports.experiment_report import write_experiment_report
+
+    experiment = EXPERIMENTS[name]
+    how = {"quick": quick, "seeds": seeds, "workers": workers, "scheduler": scheduler, "progress": progress}
+    sections = []
+    for part, module in experiment.modules.items():
+        sections += _run_part(module, folder / part, how)
+    lede = experiment.lede + (" This is the quick version: few layouts, people and seeds." if quick else "")
+    return write_experiment_report(folder, sections, title=experiment.title, lede=lede)
+
+
+def _run_part(module: str, folder: Path, how: Mapping[str, Any]) -> list[Section]:
+    """Run one part and read its sections; what needs recordings that are not there says so in the report."""
+    from benchmarks.reports.experiment_report import Section
+    from legible_envs.datasets.overcooked_2019 import RecordingsError
+
+    try:
+        importlib.import_module(module).reproduce(folder, **how)
+    except RecordingsError as error:
+        return [Section("Recorded people", f"Left out: {error}")]
+    return list(importlib.import_module(f"{module}.analysis").sections(folder))
+
+
+@click.command()
+@click.argument("experiment", type=click.Choice(list(EXPERIMENTS)))
+@click.option("--quick", is_flag=True, help="A version of two minutes.")
+@click.option("--seeds", type=click.IntRange(min=1), help="Seeds, in place of the experiment's own number.")
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Folder to write to.")
+@click.option("--workers", type=click.IntRange(min=1), help="Processes on this machine. [default: all cores]")
+@click.option("--scheduler", metavar="ADDRESS", help="Run on a Dask cluster, e.g. tcp://10.0.0.1:8786.")
+@click.option("--quiet", is_flag=True, help="Show no progress.")
+def reproduce(
+    experiment: str,
+    quick: bool,
+    seeds: int | None,
+    out: Path | None,
+    workers: int | None,
+    scheduler: str | None,
+    quiet: bool,
+) -> None:
+    """Run an experiment of the paper, and what the paper could not.
+
+    Writes result files, tables, figures and report.html. Interrupted, it goes on where it stopped.
+    """
+    from benchmarks.trials import CellsFailed
+    from benchmarks.trials.progress import CellsProgress
+
+    folder = out or Path("runs") / (f"{experiment}-quick" if quick else experiment)
+    try:
+        with CellsProgress(False if quiet else None) as progress:
+            report = run_experiment(
+                experiment,
+                folder,
+                quick=quick,
+                seeds=seeds,
+                workers=workers,
+                scheduler=scheduler,
+                progress=progress,
+            )
+    except KeyboardInterrupt:
+        click.echo(f"stopped; finished cells are kept in {folder}, the same command goes on from there", err=True)
+        raise click.exceptions.Exit(130) from None
+    except CellsFailed as error:
+        raise click.ClickException(str(error)) from error
+    _tell(folder)
+    click.echo(f"report {report}")
+
+
+def _tell(folder: Path) -> None:
+    """What was written."""
+    for kind in ("tables", "figures"):
+        found = sorted(path.name for path in (folder / kind).glob("*") if path.is_file())
+        if found:
+            click.echo(f"{kind} {folder / kind}: {', '.join(found)}")

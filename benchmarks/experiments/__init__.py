@@ -1,0 +1,1 @@
+"""The experiments of ``legible reproduce``: settings, run and analysis each."""

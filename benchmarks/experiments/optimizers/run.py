@@ -1,0 +1,116 @@
+"""Run every search of the comparison; nothing that has finished is run again."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from benchmarks.experiments.optimizers.sweep import FULL, QUICK, Settings, cells_of
+from benchmarks.reports.experiment_report import write_table
+from benchmarks.trials import Event, run_cells
+
+if TYPE_CHECKING:
+    from legible_envs.workspace import Workspace
+
+__all__ = ["reproduce", "run_cell"]
+
+Rows = list[dict[str, Any]]
+_SETTINGS = ("workspace", "iterations", "options", "evaluations")
+
+
+def reproduce(
+    folder: str | Path,
+    *,
+    quick: bool = False,
+    seeds: int | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    progress: Callable[[Event], object] | None = None,
+    settings: Settings | None = None,
+) -> None:
+    """Run what is not there yet, and write ``searches.csv``; tables and figures are made of it by ``sections``.
+
+    Args:
+        folder: Folder of the experiment.
+        quick: Small grids, few seeds and small budgets.
+        seeds: Searches of each kind, of large budgets at most as many as planned; None for those of the settings.
+        workers: See :func:`benchmarks.trials.run_cells`.
+        scheduler: See there.
+        progress: See there.
+        settings: In place of the full or quick ones.
+
+    Raises:
+        CellsFailed: Some cells failed; everything else is finished and on disk.
+        ValueError: Fewer than two seeds: nothing could be said about methods.
+    """
+    settings = settings or (QUICK if quick else FULL)
+    if seeds is not None:
+        settings = settings.with_seeds(seeds)
+    if settings.seeds < 2:
+        raise ValueError(f"methods are compared by their searches: 2 seeds or more are needed, got {settings.seeds}")
+    folder = Path(folder)
+    found = run_cells(run_cell, cells_of(settings), folder, workers=workers, scheduler=scheduler, progress=progress)
+    write_table(folder / "searches.csv", found.drop(columns=[c for c in found if str(c).split(".")[0] in _SETTINGS]))
+
+
+def run_cell(cell: dict[str, Any]) -> Rows:
+    """One search: a row for each logged moment, and one for its end.
+
+    Columns: ``moment`` (``"running"`` or ``"end"``), ``scored`` layouts so far, ``best``, ``qd_score``, ``coverage``;
+    the last row also has ``drawing``, the best kitchen without obstacles that do nothing.
+    """
+    from optimizers import search
+
+    iterations = cell["iterations"]
+    found = search(
+        _workspace(json.dumps(cell["workspace"])),
+        emitter=cell["method"],
+        emitter_options=cell["options"] or None,
+        evaluations=cell["evaluations"],
+        iterations=None if iterations is None else (iterations[0], iterations[1]),
+        seed=cell["seed"],
+        progress=False,
+    )
+    rows: Rows = [
+        {"moment": "running", "scored": row["evaluations"], "drawing": None}
+        | {key: row[key] for key in ("best", "qd_score", "coverage")}
+        for row in _thinned(found.history)
+    ]
+    if found.best_layout is None:
+        raise ValueError(f"no layout scored in {found.evaluations:,} evaluations of {json.dumps(cell)}")
+    rows.append(
+        {
+            "moment": "end",
+            "scored": found.evaluations,
+            "drawing": found.best_layout.to_ascii(),
+            "best": found.best_objective,
+            "qd_score": found.qd_score,
+            "coverage": found.coverage,
+        }
+    )
+    return rows
+
+
+@cache
+def _workspace(config: str) -> Workspace:
+    """A workspace, made once in each process: its tables and calibration take longer than a small search."""
+    from legible_envs.workspace import make_workspace
+
+    return make_workspace(json.loads(config))
+
+
+def _thinned(history: Rows, most: int = 40) -> Rows:
+    """At most ``most`` rows at evenly spaced ratios of evaluations: curves are drawn on a logarithmic axis."""
+    if len(history) <= most:
+        return history
+    first, last = history[0]["evaluations"], history[-1]["evaluations"]
+    kept, target = [], float(first)
+    for row in history:
+        if row["evaluations"] >= target:
+            kept.append(row)
+            while target <= row["evaluations"]:
+                target *= (last / first) ** (1 / (most - 1))
+    return kept if kept[-1] is history[-1] else [*kept, history[-1]]

@@ -1,0 +1,5 @@
+"""How well predictors read the recorded play of real people: settings, run and analysis."""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

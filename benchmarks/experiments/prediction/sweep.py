@@ -1,0 +1,130 @@
+"""The settings of the experiment, as data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final, Literal
+
+from legible_envs.rollouts.trajectory import Cut
+from predictors.base import FRACTIONS
+
+__all__ = [
+    "LAYOUTS",
+    "NEURAL",
+    "POINTING_NEURAL",
+    "POINTING_PREDICTORS",
+    "POINTING_REFERENCE",
+    "PREDICTORS",
+    "REFERENCE",
+    "UNTRAINED",
+    "Experiment",
+    "Setting",
+]
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One predictor of the comparison.
+
+    Attributes:
+        label: What tables call it.
+        predictor: Its name, or ``"module:Class"``.
+        parameters: Its parameters.
+        repeats: Most repeats of the cross-validation, for those that take minutes; None: no limit.
+    """
+
+    label: str
+    predictor: str
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    repeats: int | None = None
+
+
+LAYOUTS: Final = ("asymmetric_advantages", "coordination_ring", "cramped_room", "random3")
+"""Recorded kitchens in which people walk to dispensers; in ``random0`` these are handed across a counter."""
+
+UNTRAINED: Final = (
+    Setting("shortest distance", "shortest-distance", {"metric": "manhattan"}),
+    Setting("Eq. 1", "bayesian", {"beta": 1.0}),
+)
+"""Predictors that learn nothing from walks."""
+
+PREDICTORS: Final = (
+    *UNTRAINED,
+    Setting("Eq. 1 (soft costs)", "bayesian", {"beta": 1.0, "costs": "soft"}),
+    Setting("Eq. 1 (soft costs, prior)", "bayesian", {"beta": 1.0, "costs": "soft", "prior": "empirical"}),
+    Setting("MaxEnt IRL", "maxent-irl"),
+    Setting("MaxEnt IRL with prior", "maxent-irl", {"prior": "empirical"}),
+    Setting("n-gram", "grid-ngram"),
+    Setting("k-NN", "grid-knn"),
+    Setting("logistic", "grid-logistic"),
+)
+"""Everyone; "with prior" means that goals are expected as often as they were chosen in training walks."""
+
+NEURAL: Final = (Setting("GRU", "recurrent"), Setting("Transformer", "transformer", repeats=1))
+"""Learned networks, whose fitting needs torch."""
+
+REFERENCE: Final[Mapping[str, tuple[float, float, float, float]]] = {
+    "shortest distance": (0.605, 0.293, 0.350, 0.448),
+    "Eq. 1": (0.712, 0.337, 0.471, 0.378),
+    "Eq. 1 (soft costs)": (0.754, 0.323, 0.444, 0.453),
+    "MaxEnt IRL": (0.754, 0.323, 0.444, 0.454),
+    "MaxEnt IRL with prior": (0.941, 0.413, 0.666, 0.449),
+    "k-NN": (0.930, 0.422, 0.676, 0.454),
+    "logistic": (0.937, 0.420, 0.680, 0.493),
+    "GRU": (0.935, 0.439, 0.676, 0.488),
+}
+"""Mean accuracy over 10..90 % in each of ``LAYOUTS``, measured before with other implementations of the same ideas."""
+
+POINTING_PREDICTORS: Final = (
+    Setting("nearest target", "shortest-distance", {"metric": "euclidean"}),
+    Setting("Eq. 1, straight lines", "reach-bayesian"),
+    Setting("Gaussian, open-end", "reach-gaussian"),
+    Setting("Gaussian, index", "reach-gaussian", {"online": "index"}),
+    Setting("Gaussian with velocity, open-end", "reach-gaussian", {"velocity": True}),
+    Setting("Gaussian with velocity, index", "reach-gaussian", {"velocity": True, "online": "index"}),
+    Setting("Gaussian with velocity, newest sample", "reach-gaussian", {"velocity": True, "half_life": 0.0}),
+    Setting("logistic", "reach-logistic"),
+    Setting("logistic, degree 2", "reach-logistic", {"degree": 2}),
+    Setting("k-NN", "reach-knn"),
+)
+"""Whom to compare on real pointing."""
+
+POINTING_NEURAL: Final = (Setting("GRU", "recurrent"), Setting("Transformer", "transformer"))
+
+POINTING_REFERENCE: Final[Mapping[str, float]] = {
+    "nearest target": 0.754,
+    "Eq. 1, straight lines": 0.759,
+    "Gaussian, open-end": 0.711,
+    "Gaussian, index": 0.723,
+    "Gaussian with velocity, index": 0.757,
+    "logistic": 0.776,
+    "GRU": 0.798,
+}
+"""Mean accuracy over 10..90 % on 1,258 movements of 53 people, measured before with other implementations."""
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """What is judged on recorded play, and how.
+
+    Attributes:
+        predictors: Whom to compare.
+        layouts: Kitchens, by the names they have in the recordings.
+        fractions: Fractions observed.
+        cut: Fraction of what; see :data:`legible_envs.rollouts.CUTS`.
+        candidate_set: Which goals count as possible; see
+            :func:`legible_envs.datasets.overcooked_2019.recorded_trajectories`.
+        folds: How many parts the walks are split into.
+        repeats: How often, with other splits.
+        seed: Of the splits.
+    """
+
+    predictors: Sequence[Setting] = PREDICTORS
+    layouts: Sequence[str] = LAYOUTS
+    fractions: Sequence[float] = FRACTIONS
+    cut: Cut = "cells"
+    candidate_set: Literal["game", "all"] = "all"
+    folds: int = 4
+    repeats: int = 3
+    seed: int = 0

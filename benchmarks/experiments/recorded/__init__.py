@@ -1,0 +1,5 @@
+"""Is the legibility score a predictor of how well real people are predicted? Settings, run and analysis."""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

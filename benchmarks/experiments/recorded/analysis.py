@@ -1,0 +1,291 @@
+"""Tables, figures and words from logged results alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from benchmarks.experiments.recorded.sweep import BOOTSTRAPS, MIN_WALKS
+from benchmarks.reports.experiment_report import Section, write_tables
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["correlate", "detectable", "places_of", "sections", "spearman"]
+
+Floats = npt.NDArray[np.float64]
+Level = Literal["stage", "reach"]
+LEVELS: Final[tuple[Level, ...]] = ("stage", "reach")
+
+
+def sections(folder: str | Path, *, bootstraps: int = BOOTSTRAPS) -> list[Section]:
+    """Write ``tables/*.csv`` and ``figures/*``, and return the pieces of the report.
+
+    Args:
+        folder: Where :func:`benchmarks.experiments.recorded.run.reproduce` left its results.
+        bootstraps: Resamples behind each interval.
+
+    Raises:
+        FileNotFoundError: There are no results.
+    """
+    import pandas as pd
+
+    from benchmarks.experiments.recorded.figures import draw_all
+
+    folder = Path(folder)
+    scores, readings = (_read(folder / f"{name}.csv") for name in ("scores", "readings"))
+    places = {level: places_of(scores, readings, level) for level in LEVELS}
+    correlations = pd.concat(
+        [correlate(scores, readings, level, bootstraps=bootstraps).assign(level=level) for level in LEVELS],
+        ignore_index=True,
+    )
+    front = ["candidate_set", "level", "predictor"]
+    correlations = correlations[[*front, *(c for c in correlations if c not in front)]]
+    kitchens = _kitchens(places["stage"])
+    tables = {"stages": places["stage"], "reaches": places["reach"], "correlations": correlations, "kitchens": kitchens}
+    write_tables(folder / "tables", tables.items())
+    figures = draw_all(places["stage"], correlations, folder / "figures")
+    return [
+        Section(
+            "Recorded people: does the score say how predictable people are?",
+            _words(correlations, places["stage"]),
+            {"Rank correlation of legibility with accuracy": correlations, "By kitchen": kitchens},
+            figures,
+        )
+    ]
+
+
+def _read(path: Path) -> pd.DataFrame:
+    import pandas as pd
+
+    if not path.is_file():
+        raise FileNotFoundError(f"{path} is missing; run the experiment on recorded people first")
+    table = pd.read_csv(path)
+    return table.assign(goal=table["goal"].fillna(""))
+
+
+# -- places -----------------------------------------------------------------------------------------------------------
+
+
+def places_of(scores: pd.DataFrame, readings: pd.DataFrame, level: Level, min_walks: int = MIN_WALKS) -> pd.DataFrame:
+    """Legibility and measured accuracy side by side.
+
+    Args:
+        scores: As logged.
+        readings: As logged.
+        level: A row per ``"stage"`` (start and set of goals) or per ``"reach"`` (the goal, too).
+        min_walks: Places with fewer walks are left out.
+
+    Returns:
+        ``candidate_set, kitchen, start, goals`` (and ``goal``), ``predictor, candidates, walks, participants, score,
+        accuracy, skill``; skill is the accuracy above guessing among the candidates, 1 if always right.
+    """
+    keys = _keys(level)
+    own = scores[scores["goal"] == ""] if level == "stage" else scores[scores["goal"] != ""]
+    weighted = readings.assign(hits=readings["correct"] * readings["walks"])
+    found = weighted.groupby([*keys, "predictor"], sort=False).agg(
+        walks=("walks", "sum"), hits=("hits", "sum"), participants=("participant", "nunique")
+    )
+    table = found.reset_index().merge(own[[*keys, "candidates", "score"]], on=keys)
+    table = table[table["walks"] >= min_walks].reset_index(drop=True)
+    table["accuracy"] = table.pop("hits") / table["walks"]
+    table["skill"] = _skill(table["accuracy"].to_numpy(), table["candidates"].to_numpy())
+    return table
+
+
+def _keys(level: Level) -> list[str]:
+    return ["candidate_set", "kitchen", "start", "goals", *(["goal"] if level == "reach" else [])]
+
+
+def _skill(accuracy: Floats, candidates: Floats) -> Floats:
+    chance = 1 / candidates
+    return np.asarray((accuracy - chance) / (1 - chance))
+
+
+def _kitchens(stages: pd.DataFrame) -> pd.DataFrame:
+    """Means of stages by kitchen, each stage counting as often as it was walked in: four kitchens are no sample."""
+    parts = stages.assign(**{f"_{name}": stages[name] * stages["walks"] for name in ("score", "accuracy", "skill")})
+    sums = parts.groupby(["candidate_set", "kitchen", "predictor"], sort=False)[
+        ["walks", "_score", "_accuracy", "_skill"]
+    ].sum()
+    for name in ("score", "accuracy", "skill"):
+        sums[name] = sums.pop(f"_{name}") / sums["walks"]
+    return sums.reset_index()
+
+
+# -- correlation ------------------------------------------------------------------------------------------------------
+
+
+def spearman(x: Floats, y: Floats) -> float:
+    """Spearman's rank correlation, ties averaged; NaN where one side does not vary or there are fewer than three."""
+    return float(spearman_rows(x[None], y[None])[0])
+
+
+def spearman_rows(x: Floats, y: Floats) -> Floats:
+    """``(k,)`` :func:`spearman` of each row of ``x (k, n)`` with that of ``y (k, n)``."""
+    from scipy.stats import rankdata
+
+    if x.shape[1] < 3:
+        return np.full(len(x), np.nan)
+    a, b = (rankdata(values, axis=1) - (x.shape[1] + 1) / 2 for values in (x, y))
+    spread = np.sqrt((a**2).sum(axis=1) * (b**2).sum(axis=1))
+    varies = spread > 0
+    return np.where(varies, (a * b).sum(axis=1) / np.where(varies, spread, 1.0), np.nan)
+
+
+def detectable(n: int, power: float = 0.8, alpha: float = 0.05) -> float:
+    """The rank correlation that a two-sided test on ``n`` pairs finds with a given power.
+
+    By Fisher's z with the variance 1.06 / (n - 3) of ranks (Fieller, Hartley and Pearson, 1957); NaN for ``n < 5``.
+    """
+    from scipy.stats import norm
+
+    if n < 5:
+        return float("nan")
+    return float(np.tanh((norm.ppf(1 - alpha / 2) + norm.ppf(power)) * np.sqrt(1.06 / (n - 3))))
+
+
+def correlate(
+    scores: pd.DataFrame, readings: pd.DataFrame, level: Level, *, bootstraps: int = BOOTSTRAPS, seed: int = 0
+) -> pd.DataFrame:
+    """Rank correlations of legibility with accuracy, with intervals over people and over places.
+
+    Args:
+        scores: As logged.
+        readings: As logged.
+        level: See :func:`places_of`.
+        bootstraps: Resamples: of people, whose walks go together; and of places.
+        seed: Of the resamples.
+
+    Returns:
+        ``candidate_set, predictor, places, rho`` (with accuracy), ``people_low, people_high, places_low, places_high``
+        (95 % percentile intervals), ``p`` (two-sided, by permutation of places), ``rho_skill`` (with the accuracy above
+        chance: a stage with fewer goals is both more legible and easier) with ``skill_low, skill_high`` (over places),
+        ``rho_within`` (of differences from the mean of each kitchen: kitchens differ in more than legibility),
+        and ``detectable``, the correlation that so many places find with a power of 80 %.
+    """
+    import pandas as pd
+
+    places = places_of(scores, readings, level)
+    keys = _keys(level)
+    rows = []
+    for (candidate_set, predictor), part in places.groupby(["candidate_set", "predictor"], sort=False):
+        rng = np.random.default_rng(seed)
+        own = readings[(readings["candidate_set"] == candidate_set) & (readings["predictor"] == predictor)]
+        hits, walks = _by_person(own, part, keys)
+        score, candidates = (part[name].to_numpy(dtype=np.float64) for name in ("score", "candidates"))
+        accuracy = part["accuracy"].to_numpy()
+        skill = part["skill"].to_numpy()
+        people, lots = _resampled(hits, walks, score, bootstraps, rng)
+        above = spearman_rows(score[lots], skill[lots])
+        rho = spearman(score, accuracy)
+        orders = np.stack([rng.permutation(accuracy) for _ in range(bootstraps)])
+        shuffled = spearman_rows(np.broadcast_to(score, orders.shape), orders)
+        rows.append(
+            {
+                "candidate_set": candidate_set,
+                "predictor": predictor,
+                "places": len(part),
+                "rho": rho,
+                **_interval("people", people),
+                **_interval("places", spearman_rows(score[lots], accuracy[lots])),
+                "p": float((1 + (np.abs(shuffled) >= abs(rho) - 1e-12).sum()) / (1 + bootstraps)),
+                "rho_skill": spearman(score, _skill(accuracy, candidates)),
+                **_interval("skill", above),
+                "rho_within": spearman(_centred(score, part["kitchen"]), _centred(accuracy, part["kitchen"])),
+                "detectable": detectable(len(part)),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def _by_person(readings: pd.DataFrame, places: pd.DataFrame, keys: Sequence[str]) -> tuple[Floats, Floats]:
+    """``(places, people)`` right predictions and walks."""
+    weighted = readings.assign(hits=readings["correct"] * readings["walks"])
+    index = places.set_index(list(keys)).index
+    tables = [
+        weighted.pivot_table(index=list(keys), columns="participant", values=name, aggfunc="sum", fill_value=0)
+        .reindex(index)
+        .to_numpy(dtype=np.float64)
+        for name in ("hits", "walks")
+    ]
+    return tables[0], tables[1]
+
+
+def _resampled(
+    hits: Floats, walks: Floats, score: Floats, bootstraps: int, rng: np.random.Generator
+) -> tuple[Floats, npt.NDArray[np.intp]]:
+    """``(bootstraps,)`` correlations with people drawn anew, and ``(bootstraps, places)`` draws of places."""
+    people, number = hits.shape[1], np.empty((bootstraps, hits.shape[1]))
+    lots = np.empty((bootstraps, len(score)), dtype=np.intp)
+    for i in range(bootstraps):
+        number[i] = rng.multinomial(people, np.full(people, 1 / people))
+        lots[i] = rng.integers(len(score), size=len(score))
+    right, count = number @ hits.T, number @ walks.T
+    found = np.full(bootstraps, np.nan)
+    # Where nobody drawn was ever at a place, it does not count.
+    for seen in np.unique(count > 0, axis=0):
+        rows = ((count > 0) == seen).all(axis=1)
+        shares = right[np.ix_(rows, seen)] / count[np.ix_(rows, seen)]
+        found[rows] = spearman_rows(np.broadcast_to(score[seen], shares.shape), shares)
+    return found, lots
+
+
+def _centred(values: Floats, groups: pd.Series[Any]) -> Floats:
+    """Values without the mean of their group."""
+    _, number = np.unique(groups.to_numpy(dtype=str), return_inverse=True)
+    return np.asarray(values - (np.bincount(number, values) / np.bincount(number))[number])
+
+
+def _interval(name: str, values: Floats) -> dict[str, float]:
+    known = values[~np.isnan(values)]
+    low, high = np.percentile(known, [2.5, 97.5]) if len(known) else (np.nan, np.nan)
+    return {f"{name}_low": float(low), f"{name}_high": float(high)}
+
+
+# -- words ------------------------------------------------------------------------------------------------------------
+
+
+def _words(correlations: pd.DataFrame, stages: pd.DataFrame) -> str:
+    parts = [
+        "Nobody designed the recorded kitchens to be read. If the score means anything for real people, stages (a "
+        "start and the goals that count as possible there) that score higher should be read better. The score of a "
+        "stage is Eq. 2 averaged over its goals and all prefixes of shortest walks; accuracy is the mean over 10 to "
+        f"90 % of a walk. Stages with fewer than {MIN_WALKS} walks are left out. There are four kitchens only, too few "
+        "to correlate; their means stand in the table."
+    ]
+    for candidate_set, own in correlations.groupby("candidate_set", sort=False):
+        kind = "every dispenser in reach is a goal" if candidate_set == "all" else "goals of use in the running game"
+        for level, part in own.groupby("level", sort=False):
+            parts.append(_verdict(f"{kind}, stage level" if level == "stage" else f"{kind}, goal by goal", part))
+    return "\n\n".join(parts)
+
+
+def _verdict(what: str, part: pd.DataFrame) -> str:
+    found = part[(part["places_low"] > 0) & (part["people_low"] > 0)]
+    against = part[part["places_high"] < 0]
+    above = part[part["skill_low"] > 0]
+    rows: list[dict[str, Any]] = [{str(k): v for k, v in row.items()} for row in part.to_dict("records")]
+    values = ", ".join(
+        f"{row['predictor']} {row['rho']:+.2f} [{row['places_low']:+.2f}, {row['places_high']:+.2f}]" for row in rows
+    )
+    if len(found) == len(part):
+        answer = "yes, for every predictor"
+    elif len(found):
+        answer = f"for {', '.join(found['predictor'])}, not for the others"
+    else:
+        answer = "no, not shown for any predictor"
+    if len(against):
+        answer += f"; the reverse for {', '.join(against['predictor'])}"
+    said = f"for {', '.join(above['predictor'])}" if len(above) else "for none"
+    return (
+        f"{what[0].upper()}{what[1:]}: {answer}. Rank correlations [95 % over places]: {values}. Beyond what the "
+        f"number of goals explains (correlation with accuracy above chance), it is shown {said}. "
+        f"Within kitchens the correlations are {part['rho_within'].min():+.2f} to {part['rho_within'].max():+.2f}. "
+        f"With {int(part['places'].min())} places only correlations of {part['detectable'].max():.2f} or more are "
+        "found with a power of 80 %."
+    )

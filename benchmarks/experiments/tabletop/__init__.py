@@ -1,0 +1,9 @@
+"""The paper's tables: are people at legible ones read better, and does a robot profit? Settings, run and analysis.
+
+Tung, Luebbers, Roncone and Hayes, *Workspace Optimization Techniques to Improve Prediction of Human Motion During
+Human-Robot Collaboration* (HRI 2024), the study at a table, with simulated people; and what it left out, the robot.
+"""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

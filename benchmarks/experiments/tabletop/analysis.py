@@ -1,0 +1,145 @@
+"""Tables, figures and words from logged results alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from benchmarks.experiments.conditions import stacked, variance_rows
+from benchmarks.experiments.tabletop import figures, narrative, tables
+from benchmarks.reports.experiment_report import Section, write_tables
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from benchmarks.experiments.hypotheses import Hypotheses
+
+__all__ = ["sections"]
+
+
+def sections(folder: str | Path) -> list[Section]:
+    """Write ``tables/*.csv`` and ``figures/*``, and return the pieces of the report.
+
+    Args:
+        folder: Where :func:`benchmarks.experiments.tabletop.run.reproduce` left its results.
+
+    Raises:
+        FileNotFoundError: There are no results.
+    """
+    folder = Path(folder)
+    results = tables.load_results(folder)
+    found = _tables(results)
+    hypotheses = tables.hypotheses_of(results)
+    found["verdicts"] = stacked({name: one.verdicts() for name, one in hypotheses.items()}, "design")
+    tests = {name: one.tests.drop(columns="treatment") for name, one in hypotheses.items()}
+    found["hypotheses"] = stacked(tests, "design")
+    found["hypotheses_by_fraction"] = stacked({name: one.points for name, one in hypotheses.items()}, "design")
+    write_tables(folder / "tables", found.items())
+    drawn = figures.draw_all(results, folder / "figures")
+    return [
+        *_reading_sections(results, found, drawn),
+        *_claim_sections(results, found, hypotheses, drawn),
+        Section(
+            "With a robot",
+            narrative.about_teams(results, found["teams"], found["team_differences"]),
+            {
+                "Against the Baseline, the robot reads by Eq. 1 (Tukey's intervals, people as units)": found[
+                    "team_differences"
+                ],
+                "All measures, means over people and 95 % intervals": found["teams"],
+            },
+            drawn["teams"],
+        ),
+        Section(
+            "What is taken for what",
+            f"Confusions at the tables shown, {results.predictors[0]}, in reaches: means over fractions and repeats.",
+            {},
+            drawn["confusion"],
+        ),
+    ]
+
+
+def _tables(results: tables.Results) -> dict[str, pd.DataFrame]:
+    """Everything that is written to ``tables``, by name, but for the hypotheses."""
+    best, metrics = tables.best_layouts(results), tables.metrics_table(results)
+    spread = tables.spread_table(results)
+    return {
+        "layouts": _layout_table(results.layouts),
+        "metrics": metrics,
+        "starts": tables.start_table(results),
+        "published": tables.beside_published(metrics, results.predictors[:2]),
+        "spread": spread,
+        "published_spread": tables.spread_beside_published(spread),
+        "anova": variance_rows(tables.accuracy_rows(results), results.predictors, best),
+        "compliance": tables.compliance_table(results),
+        "teams": tables.team_table(results),
+        "team_differences": tables.team_differences(results, str(results.teams["reader"].iloc[0])),
+    }
+
+
+def _reading_sections(
+    results: tables.Results, found: dict[str, pd.DataFrame], drawn: dict[str, list[Path]]
+) -> list[Section]:
+    return [
+        Section(
+            "Tables", narrative.about_layouts(results), {"Tables by condition": found["layouts"]}, drawn["layouts"]
+        ),
+        Section("People", narrative.PEOPLE),
+        Section(
+            "How well people are read",
+            f"{narrative.about_reading(results, found['metrics'], found['anova'])}\n\n{narrative.UNITS}",
+            {
+                "Figures of merit, mean over 10 to 90 % observed": found["metrics"],
+                "Over all fractions: one-way analyses of variance": _overall(found["anova"]),
+                "Accuracy by where reaches begin": found["starts"],
+            },
+            drawn["accuracy"],
+        ),
+        Section(
+            "Beside the paper",
+            narrative.agreement(found["published"], found["metrics"], results.predictors),
+            {"Weighted F1, precision and recall": found["published"]},
+            drawn["published"],
+        ),
+        Section(
+            "How much reaches differ",
+            narrative.about_spread(found["spread"], found["published_spread"]),
+            {
+                "Determinant (m^4) and trace (m^2) beside the paper": found["published_spread"],
+                "By alignment": found["spread"],
+            },
+            drawn["spread"],
+        ),
+    ]
+
+
+def _claim_sections(
+    results: tables.Results,
+    found: dict[str, pd.DataFrame],
+    hypotheses: dict[str, Hypotheses],
+    drawn: dict[str, list[Path]],
+) -> list[Section]:
+    return [
+        Section(
+            "Hypotheses",
+            narrative.about_hypotheses(hypotheses),
+            {"Verdicts": found["verdicts"], "Every test": found["hypotheses"]},
+            drawn["curves"],
+        ),
+        Section(
+            "People who ignore virtual obstacles",
+            narrative.about_compliance(found["compliance"]),
+            {"Accuracy by how often people reach across obstacles": found["compliance"]},
+        ),
+    ]
+
+
+def _layout_table(layouts: pd.DataFrame) -> pd.DataFrame:
+    names = {"score": "legibility", "num_obstacles": "obstacles", "found_after": "evaluations"}
+    keep = ["condition", "layout", "score", "normalised", "distance", "mean_detour", "max_detour", "num_obstacles"]
+    return layouts[[*keep, "found_after"]].rename(columns=names)
+
+
+def _overall(anova: pd.DataFrame) -> pd.DataFrame:
+    own = anova[anova["fraction"].isna()]
+    return own[["predictor", "unit", "F", "df1", "df2", "p", "eta_squared"]].reset_index(drop=True)

@@ -1,0 +1,1 @@
+"""How the layouts of each workspace are named, printed, drawn and put into a report."""

@@ -1,0 +1,248 @@
+"""Kitchens on the command line and in reports: how one is named, scored, printed and drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import click
+import numpy as np
+import numpy.typing as npt
+
+from benchmarks.console import board_for, number
+from benchmarks.presenters.base import Condition, Design, Part, Presenter, as_genome, load_design, refuse
+from benchmarks.runs import Run
+from legible_envs.errors import LayoutError
+from legible_envs.overcooked.layout import OvercookedLayout
+
+if TYPE_CHECKING:
+    from rich.console import Console, RenderableType
+    from rich.table import Table
+
+    from legible_envs.drawing import Image
+    from legible_envs.overcooked.recipes import Recipe
+    from legible_envs.rollouts.trajectory import Trajectory
+    from predictors import GoalPredictor
+
+__all__ = ["Kitchen", "KitchenPresenter", "boards", "kitchen_from", "load_kitchen"]
+
+
+class Kitchen(Design):
+    """A kitchen named on the command line; ``settings`` are ``prefix`` and ``pots``."""
+
+    thing: ClassVar[str] = "kitchen"
+
+    def _summary_outside(self) -> dict[str, Any]:
+        from legible_envs.overcooked.scoring.explanation import score_layout
+
+        return dict(score_layout(self.layout, **self._score_settings()))
+
+    def _explain_outside(self) -> list[dict[str, Any]]:
+        from legible_envs.overcooked.scoring.explanation import explain_layout
+
+        return explain_layout(self.layout, **self._score_settings())
+
+    def ambiguity(self) -> npt.NDArray[np.float64]:
+        """``(H, W)`` how often an observer would name a wrong goal, NaN where nobody walks."""
+        if self.genome is not None:
+            return np.asarray(self.workspace.ambiguity(self.genome))
+        from legible_envs.overcooked.scoring.explanation import ambiguity
+
+        return ambiguity(self.layout, **self._score_settings())
+
+    def _score_settings(self) -> dict[str, Any]:
+        """What was asked for, in the words of :mod:`legible_envs.overcooked.scoring.explanation`."""
+        from legible_envs.overcooked.recipes import soup_task
+
+        settings = dict(self.settings)
+        return {"task": soup_task(self.soups, settings.pop("pots", None)), **settings}
+
+    @property
+    def soups(self) -> tuple[Recipe, ...]:
+        """The soups that the scored task cooks."""
+        if self.genome is not None:
+            return tuple(self.workspace.recipes)
+        from legible_envs.overcooked.human_play import recipes_for
+
+        return recipes_for(self.layout)
+
+    def facts(self) -> list[tuple[str, str]]:
+        """Score, distance, task, and the rule it breaks."""
+        summary = self.summary()
+        part, share = summary["single_goal_score"], summary["single_goal_share"]
+        return [
+            ("legibility", number(summary["score"], 4)),
+            ("distance", number(summary["distance"], 4)),
+            ("normalised", number(summary["normalised"], 4)),
+            ("single-goal", number(part, 4) + (f" ({share:.1%} of the score)" if 0 <= share <= 1 else "")),
+            ("obstacles", str(summary["num_obstacles"])),
+            ("task", "; ".join(" + ".join(soup) for soup in self.soups)),
+            ("candidate set", summary["candidate_set"]),
+            ("sequences", f"{summary['num_sequences']:,}"),
+            ("layout id", summary["layout_id"]),
+            *([("design rules", f"outside: {self.broken_rule}")] if self.broken_rule else []),
+        ]
+
+    def text(self, console: Console) -> RenderableType:
+        """The kitchen in the characters that this console can show."""
+        return board_for(console, self.layout)
+
+    def draw(self) -> Image:
+        """The kitchen with, on each cell, how often an observer would name a wrong goal."""
+        from legible_envs.overcooked.rendering import draw_ambiguity
+
+        return draw_ambiguity(self.layout, self.ambiguity(), tile=72, title="Where goals are confused")
+
+    def readers(self) -> list[tuple[str, GoalPredictor]]:
+        """The heuristic, and Eq. 1 of the paper."""
+        from predictors import BayesianGoalPredictor, ShortestDistance
+
+        return [("shortest distance", ShortestDistance()), ("Eq. 1", BayesianGoalPredictor())]
+
+    def was_walked(self, walk: Trajectory) -> bool:
+        """Whether the walk has this kitchen's cells, wherever players started."""
+        return isinstance(walk.layout, OvercookedLayout) and bool(np.array_equal(walk.layout.cells, self.layout.cells))
+
+
+def load_kitchen(source: str, *, prefix: Any = None, pots: int | None = None) -> Kitchen:
+    """Read a kitchen; see :func:`benchmarks.presenters.base.load_design`.
+
+    Raises:
+        LayoutError: It is malformed, or a table.
+        RunError: The run folder lacks something.
+        OSError: The file cannot be read.
+    """
+    design = load_design(source, prefix=prefix, pots=pots)
+    if not isinstance(design, Kitchen):
+        raise LayoutError(f"{source} is a {design.thing}; expected a kitchen", rule="type")
+    return design
+
+
+def kitchen_from(text: str, name: str, asked: Mapping[str, Any]) -> Kitchen:
+    """A kitchen from its drawing or an Overcooked-AI ``.layout`` file.
+
+    Raises:
+        LayoutError: The drawing is malformed; the message names row, column and rule.
+    """
+    from legible_envs.workspace import make_workspace
+
+    refuse(asked, "task", "kitchen")
+    try:
+        is_foreign = text.lstrip().startswith("{") or name.endswith(".layout")
+        layout = OvercookedLayout.from_overcooked_ai(text) if is_foreign else OvercookedLayout.from_ascii(text)
+    except LayoutError as error:
+        raise LayoutError(f"{name}: {error}", rule=error.rule, cell=error.cell) from error
+    try:
+        workspace = make_workspace("overcooked", shape=layout.shape, **asked)
+    except LayoutError as error:
+        return Kitchen(layout, None, None, str(error), dict(asked))
+    genome, broken_rule = as_genome(workspace, layout)
+    return Kitchen(layout, None if genome is None else workspace, genome, broken_rule, dict(asked))
+
+
+class KitchenPresenter(Presenter):
+    """Presents the workspace ``"overcooked"``."""
+
+    name: ClassVar[str] = "overcooked"
+    thing: ClassVar[str] = "kitchen"
+    options: ClassVar[frozenset[str]] = frozenset({"shape", "pots", "lock", "relocation_cost"})
+    script: ClassVar[str] = "kitchen.js"
+    icons: ClassVar[str | None] = "kitchen_icons.html"
+    words: ClassVar[dict[str, Any]] = {
+        "things": "kitchens",
+        "axes": {"obstacles": "virtual obstacles", "order": "reading order of the ingredients"},
+        "archive": "with that many virtual obstacles (up) and its ingredients in that reading order (across)",
+        "conditions": "The same room and the same task. A legible kitchen gives the cook's goal away early; its price "
+        "is the distance walked.",
+        "best": "The best layout of each reading order, for the highest-scoring orders.",
+        "distance": "expected steps of one task",
+        "distance_unit": "steps",
+        "distance_digits": 1,
+        "made": "over all shortest paths, prefixes and valid orders of the task",
+        "measured": "the expected number of floor moves of the whole task",
+        "reach": "walk",
+    }
+
+    def design(self, settings: Mapping[str, Any]) -> dict[str, Any]:
+        """Shape, prefix, pots, and the kitchen to start from."""
+        found = {key: settings[key] for key in ("shape", "prefix", "pots") if key in settings}
+        if settings.get("start_from") is not None:
+            kitchen = load_kitchen(settings["start_from"]).layout
+            found |= {"shape": kitchen.shape, "start_from": kitchen.to_ascii()}
+            found |= {"relocation_cost": settings.get("relocation_cost", 0.0), "locked": list(settings.get("lock", ()))}
+        elif settings.get("lock") or settings.get("relocation_cost"):
+            raise click.UsageError("--lock and --relocation-cost need --start-from, the kitchen they are about")
+        return found
+
+    def folder_name(self, settings: Mapping[str, Any]) -> str:
+        """Shape and objective."""
+        rows, columns = settings["shape"]
+        return f"{rows}x{columns}-{settings['objective']}"
+
+    def parts(self, config: Mapping[str, Any], settings: Mapping[str, Any], out: Path) -> list[Part]:
+        """One search."""
+        from legible_envs.workspace import make_workspace
+
+        return [Part(out, make_workspace(config))]
+
+    def text(self, console: Console, layout: OvercookedLayout) -> RenderableType:
+        """The kitchen in colour."""
+        return board_for(console, layout)
+
+    def draw(self, layout: OvercookedLayout, workspace: Any, *, tile: int = 64) -> Image:
+        """The kitchen with nobody in it."""
+        from legible_envs.overcooked.rendering import draw_layout
+
+        return draw_layout(layout, tile=tile)
+
+    def design_of_run(self, run: Run, asked: Mapping[str, Any]) -> Design:
+        """The best kitchen of a run."""
+        from legible_envs.workspace import make_workspace
+
+        refuse(asked, "task", "kitchen")
+        workspace = make_workspace({**run.config["workspace"], **asked}) if asked else run.workspace
+        return Kitchen(run.workspace.decode(run.best_genome), workspace, run.best_genome, "", dict(asked))
+
+    # -- the page of a report --------------------------------------------------------------------------------------
+
+    def place(self, workspace: Any) -> dict[str, Any]:
+        """Rows and columns."""
+        return {"shape": list(workspace.shape)}
+
+    def encode(self, layout: OvercookedLayout) -> str:
+        """The drawing without line breaks and players: ``H * W`` symbols."""
+        from legible_envs.overcooked.layout import SYMBOLS
+
+        return "".join(SYMBOLS[code] for code in layout.cells.ravel())
+
+    def carried(self, workspace: Any, room: int) -> int:
+        """How many drawings fit into that many bytes."""
+        height, width = workspace.shape
+        return room // (height * width + 3)
+
+    def title(self, data: Mapping[str, Any]) -> str:
+        """What was wanted, and the size of the room."""
+        rows, columns = data["place"]["shape"]
+        return f"A search for {WANTED.get(data['objective']['name'], 'good')} kitchens, {rows} × {columns}"
+
+
+WANTED = {"legibility": "legible", "efficiency": "efficient", "legible-efficient": "legible and efficient"}
+"""Objectives as adjectives."""
+
+
+def boards(console: Console, conditions: Sequence[Condition]) -> Table:
+    """Kitchens side by side, each over its name, its scores and how it was chosen."""
+    from rich.table import Table
+    from rich.text import Text
+
+    grid = Table.grid(padding=(0, 4))
+    for _ in conditions:
+        grid.add_column(max_width=32)
+    grid.add_row(*(board_for(console, c.layout) for c in conditions))
+    grid.add_row()
+    grid.add_row(*(Text(c.name, style="bold") for c in conditions))
+    grid.add_row(*(f"legibility [bold cyan]{number(c.score)}[/]" for c in conditions))
+    grid.add_row(*(f"distance   [bold]{number(c.distance, 1)}[/]" for c in conditions))
+    grid.add_row(*(Text(c.note, style="dim") for c in conditions))
+    return grid

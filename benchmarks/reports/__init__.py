@@ -1,0 +1,1 @@
+"""Pages that are written: of a search, of predictors on trajectories, of an experiment."""

@@ -1,0 +1,331 @@
+"""How well predictors read the people in a file: tables, figures and the section of a report."""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from legible_envs.support.files import write_atomically
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from rich.console import Console
+
+    from legible_envs.rollouts.trajectory import Cut, Trajectory
+    from predictors.evaluation.cross_validation import Comparison, Evaluation, LearningCurve
+    from predictors.evaluation.splits import Groups
+
+__all__ = ["FOLDER", "Reading", "print_reading", "read_walks", "reading_section", "save_reading", "write_reading"]
+
+FOLDER: Final = "people"
+"""Where in a run's folder ``legible score RUN --predictor`` writes."""
+_FILE: Final = "reading.json"
+_FIGURES: Final = ("accuracy", "learning_curve", "confusion")
+_CONFUSION_AT: Final = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """What was found.
+
+    Attributes:
+        evaluation: By cross-validation.
+        curve: The learning curve, or None where it was not asked for or cannot be drawn.
+        comparisons: By what was compared: ``"predictor"``, or ``"condition"`` and whose values.
+        notes: What was left out, and why.
+    """
+
+    evaluation: Evaluation
+    curve: LearningCurve | None
+    comparisons: dict[str, tuple[Comparison, Comparison]]
+    notes: list[str] = field(default_factory=list)
+
+
+def read_walks(
+    walks: Sequence[Trajectory],
+    predictors: Sequence[str],
+    *,
+    cut: Cut = "steps",
+    folds: int = 4,
+    repeats: int = 3,
+    groups: Groups | None = None,
+    keep_rare: bool = False,
+    curve: bool = True,
+    seed: int = 0,
+) -> Reading:
+    """Judge predictors on walks, compare them, and compare the conditions among the walks.
+
+    Args:
+        walks: Complete, with goals.
+        predictors: Names or ``"module:Class"``.
+        cut: Fraction of what; see :data:`legible_envs.rollouts.CUTS`.
+        folds: Of the cross-validation.
+        repeats: Of the cross-validation.
+        groups: ``"participant"`` keeps each person on one side of every split.
+        keep_rare: Whether to judge goals with fewer examples than folds.
+        curve: Whether to draw a learning curve, which learns fifteen times more.
+        seed: Of the splits.
+
+    Raises:
+        PredictorError: A predictor that cannot be found or made.
+        ValueError: Walks that cannot be split so.
+    """
+    from predictors.evaluation.cross_validation import evaluate, learning_curve
+
+    names = list(dict.fromkeys(predictors))
+    found = evaluate(
+        names,
+        walks,
+        cv=folds,
+        repeats=repeats,
+        cut=cut,
+        groups=groups,
+        rare="keep" if keep_rare else "error",
+        seed=seed,
+    )
+    notes: list[str] = []
+    grown = None
+    if curve:
+        try:
+            grown = learning_curve(names, walks, cut=cut, groups=groups, repeats=3, seed=seed)
+        except ValueError as error:
+            notes.append(f"no learning curve: {error}")
+    comparisons: dict[str, tuple[Comparison, Comparison]] = {}
+    if len(names) > 1:
+        _compare(comparisons, notes, "predictor", found, factor="predictor")
+    if len({walk.condition for walk in walks}) > 1:
+        for name in names:
+            _compare(comparisons, notes, f"condition ({name})", found, factor="condition", predictor=name)
+    return Reading(found, grown, comparisons, notes)
+
+
+def _compare(
+    comparisons: dict[str, tuple[Comparison, Comparison]],
+    notes: list[str],
+    what: str,
+    found: Evaluation,
+    **options: Any,
+) -> None:
+    from predictors.evaluation.cross_validation import compare_conditions
+
+    try:
+        each = compare_conditions(found, correct_fractions="holm", **options)
+        comparisons[what] = each, compare_conditions(found, at="mean", **options)
+    except ValueError as error:
+        notes.append(f"no comparison by {what}: {error}")
+
+
+# -- the terminal -----------------------------------------------------------------------------------------------------
+
+
+def print_reading(console: Console, reading: Reading) -> None:
+    """Print the figures of merit, accuracy against fraction observed, comparisons, and what they mean."""
+    from benchmarks.console import table
+
+    found = reading.evaluation
+    number = found.table["trajectory"].nunique()
+    console.print(f"\n{number:,} walks: how well predictors read them, mean over fractions observed", style="bold")
+    console.print(table(_summary_rows(found)))
+    console.print("Accuracy by share of the walk observed", style="bold")
+    console.print(table(_accuracy_rows(found)))
+    for what, (_, mean) in reading.comparisons.items():
+        console.print(f"Differences by {what}", style="bold")
+        console.print(table(_pair_rows(mean)))
+        console.print(_verdict(mean), style="dim")
+    for note in reading.notes:
+        console.print(note, style="yellow", markup=False)
+    console.print(f"definition: {found.definition}", style="dim", markup=False)
+
+
+def _summary_rows(found: Evaluation) -> list[dict[str, Any]]:
+    columns = ["predictor", "accuracy", "f1", "precision", "recall", "log_loss", "calibration_error"]
+    return _records(found.summary()[columns])
+
+
+def _accuracy_rows(found: Evaluation) -> list[dict[str, Any]]:
+    wide = found.accuracy().pivot_table(index="predictor", columns="fraction", values="accuracy", sort=False)
+    wide = wide.reindex(columns=sorted(wide.columns))
+    return [
+        {"predictor": name, **{f"{100 * fraction:.3g}%": float(row[fraction]) for fraction in wide.columns}}
+        for name, row in wide.iterrows()
+    ]
+
+
+def _pair_rows(comparison: Comparison) -> list[dict[str, Any]]:
+    columns = ["a", "b", "difference", "low", "high", "p", "hedges_g"]
+    return _records(comparison.pairs[columns])
+
+
+def _records(table: pd.DataFrame) -> list[dict[str, Any]]:
+    return [{str(name): value for name, value in row.items()} for row in table.to_dict("records")]
+
+
+def _verdict(comparison: Comparison) -> str:
+    """The analysis of variance in the words of a paper."""
+    row = comparison.anova.iloc[0]
+    kind = "repeated-measures" if comparison.design == "within" else "one-way"
+    p = float(row["p_corrected"] if comparison.design == "within" else row["p"])
+    said = "p < .001" if p < 0.001 else f"p = {p:.3f}".replace("0.", ".", 1)
+    corrected = ", Greenhouse-Geisser" if comparison.design == "within" and len(comparison.means) > 2 else ""
+    return (
+        f"{kind} ANOVA of means over fractions, {comparison.unit}s as units (each counts once): "
+        f"F({row['df1']:.0f}, {row['df2']:.0f}) = {row['F']:.2f}, {said}{corrected}, eta^2 = "
+        f"{row['eta_squared']:.3f}; pairs by Tukey's HSD"
+    )
+
+
+# -- files ------------------------------------------------------------------------------------------------------------
+
+
+def write_reading(reading: Reading, folder: Path, *, title: str = "How well people can be read") -> list[Path]:
+    """Write tidy tables (CSV), figures (SVG), ``reading.json`` and a page ``report.html`` into a folder.
+
+    Returns:
+        The files written.
+
+    Raises:
+        OSError: The folder cannot be made or written to.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    written = [_write(folder / f"{name}.csv", table.to_csv(index=False)) for name, table in _tables(reading).items()]
+    for name in _FIGURES:  # those of an earlier reading must not stand beside this one's tables
+        (folder / f"{name}.svg").unlink(missing_ok=True)
+    written += [_write(folder / f"{name}.svg", svg) for name, svg in _drawn(reading).items()]
+    written.append(_write(folder / _FILE, json.dumps(_about(reading), indent=1)))
+    written.append(_write(folder / "report.html", _page(folder, title)))
+    return written
+
+
+def save_reading(reading: Reading, layout: str, out: Path | None) -> list[str]:
+    """Write a reading where it belongs, and say where: into ``out``, or into the folder and report of a run.
+
+    Args:
+        reading: What was found.
+        layout: What the command line calls the kitchen: a run's folder, or something else.
+        out: The folder asked for; None takes the run's, and writes nothing without a run.
+    """
+    from benchmarks.reports.search_report import write_report
+    from benchmarks.runs import is_run_folder
+
+    is_run = layout != "-" and is_run_folder(layout)
+    if out is None and not is_run:
+        return []
+    folder = out or Path(layout) / FOLDER
+    write_reading(reading, folder)
+    lines = [f"tables, figures, page: {folder}"]
+    if out is None:
+        lines.append(f"report: {write_report(layout)}")
+    return lines
+
+
+def _write(path: Path, text: str) -> Path:
+    write_atomically(path, lambda stream: stream.write(text.encode()))
+    return path
+
+
+def _tables(reading: Reading) -> dict[str, pd.DataFrame]:
+    import pandas as pd
+
+    found = reading.evaluation
+    tables = {
+        "predictions": found.table,
+        "accuracy": found.accuracy(),
+        "metrics": found.metrics(),
+        "confusion": found.confusion,
+    }
+    if reading.curve is not None:
+        tables["learning_curve"] = reading.curve.table
+    for part in ("anova", "means", "pairs"):
+        found_parts = []
+        for what, (each, mean) in reading.comparisons.items():
+            for at, comparison in (("each", each), ("mean", mean)):
+                table = getattr(comparison, part).rename(columns={comparison.factor: "level"})
+                found_parts.append(table.assign(compared=what, at=at, unit=comparison.unit, design=comparison.design))
+        if found_parts:
+            tables[f"comparison_{part}"] = pd.concat(found_parts, ignore_index=True)
+    return tables
+
+
+def _drawn(reading: Reading) -> dict[str, str]:
+    from predictors.evaluation.figures import accuracy_figure, confusion_figure, learning_curve_figure
+
+    found = reading.evaluation
+    best = str(found.summary().set_index("predictor")["accuracy"].idxmax())
+    at = min(found.fractions, key=lambda fraction: abs(fraction - _CONFUSION_AT))
+    matrix = found.confusion_matrix(best, fraction=at)
+    figures = {
+        "accuracy": accuracy_figure(found),
+        "confusion": confusion_figure(matrix, title=f"What {best} takes for what, {100 * at:.0f} % observed"),
+    }
+    if reading.curve is not None:
+        figures["learning_curve"] = learning_curve_figure(reading.curve)
+    return figures
+
+
+def _about(reading: Reading) -> dict[str, Any]:
+    """What the section of a report says, as JSON."""
+    found = reading.evaluation
+    return {
+        "schema": 1,
+        "definition": found.definition,
+        "walks": int(found.table["trajectory"].nunique()),
+        "participants": int(found.table["participant"].nunique()),
+        "summary": _summary_rows(found),
+        "comparisons": [
+            {"what": what, "verdict": _verdict(mean), "pairs": _finite(_pair_rows(mean))}
+            for what, (_, mean) in reading.comparisons.items()
+        ],
+        "notes": reading.notes,
+    }
+
+
+def _finite(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Infinite effect sizes have no place in JSON."""
+    return [
+        {key: None if isinstance(value, float) and abs(value) == float("inf") else value for key, value in row.items()}
+        for row in rows
+    ]
+
+
+# -- HTML -------------------------------------------------------------------------------------------------------------
+
+
+def reading_section(folder: Path) -> str | None:
+    """The section of a report about a reading that :func:`write_reading` left in a folder, or None if there is none.
+
+    Figures become images within the page: whatever their files hold, nothing of it can run.
+    """
+    try:
+        about = json.loads((folder / _FILE).read_text(encoding="utf-8"))
+        if about["schema"] != 1:
+            return None
+        figures = [(name, _as_image(folder / f"{name}.svg")) for name in _FIGURES if (folder / f"{name}.svg").exists()]
+        return _environment().get_template("people.html.j2").render(about=about, figures=figures)
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def _as_image(path: Path) -> str:
+    return "data:image/svg+xml;base64," + base64.b64encode(path.read_bytes()).decode("ascii")
+
+
+def _page(folder: Path, title: str) -> str:
+    from markupsafe import Markup
+
+    style = (files("benchmarks") / "templates" / "report.css").read_text(encoding="utf-8")
+    section = reading_section(folder) or ""
+    template = _environment().get_template("people_page.html.j2")
+    return template.render(title=title, style=Markup(style), section=Markup(section))
+
+
+def _environment() -> Any:
+    from jinja2 import Environment, PackageLoader
+
+    environment = Environment(loader=PackageLoader("benchmarks"), autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    environment.filters["number"] = lambda value: "–" if value is None else f"{value:.3f}".replace("-", "\u2212")
+    return environment

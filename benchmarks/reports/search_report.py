@@ -1,0 +1,366 @@
+"""``report.html``: one self-contained page about a search, readable from disk, from mail, in ten years.
+
+The page makes no request of any kind. Numbers and layouts travel in one JSON block that the page can save as a file;
+drawing happens in the reader's browser.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.presenters.base import Condition, Presenter, loss_row, presenter_of
+from benchmarks.reports.prediction_report import FOLDER, reading_section
+from benchmarks.runs import Run, read_run
+from legible_envs.support.files import write_atomically
+
+__all__ = ["report_data", "write_best_image", "write_report"]
+
+MAX_LAYOUTS = 1_000
+"""At most so many cells, the best ones, carry their layouts."""
+LAYOUT_BYTES = 150_000
+"""And at most so many bytes of layouts, so that large kitchens do not outgrow the page."""
+MAX_ROWS, MAX_COLUMNS = 80, 120
+"""Finer archives are drawn with several cells in one, each showing the best of them."""
+WORST_ROWS, BEST_ROWS = 10, 3
+"""Reaches of the best layout that are listed."""
+MAX_POINTS = 240
+"""Points of a search curve; longer histories are thinned."""
+
+
+def write_report(
+    run_folder: str | Path,
+    *,
+    conditions: Sequence[Condition] | None = None,
+    recorded_play: Mapping[str, Any] | None = None,
+) -> Path:
+    """Write ``report.html`` into a run folder, from the files that :func:`optimizers.search` left there.
+
+    What ``legible score RUN --predictor NAME`` found about people is a section of it.
+
+    Args:
+        run_folder: The folder of a finished, interrupted or running search.
+        conditions: Layouts to show side by side; None shows what the run itself compares, if anything.
+        recorded_play: How predictors read recorded people (see :func:`benchmarks.cli.demo.recorded_play`): ``note``,
+            ``fractions``, ``curves`` (each ``label``, ``values``) and ``table`` (``columns``, ``rows``). None leaves
+            the section out; a mapping with only a ``note`` says why there is none.
+
+    Returns:
+        The path of the page.
+
+    Raises:
+        RunError: A file of the run is missing or damaged.
+    """
+    run = read_run(run_folder)
+    path = run.folder / "report.html"
+    presenter = _presenter(run)
+    data = report_data(run, conditions, recorded_play)
+    page = _render(data, presenter, _reaches(run), reading_section(run.folder / FOLDER) or "")
+    write_atomically(path, lambda stream: stream.write(page.encode()))
+    return path
+
+
+def write_best_image(run_folder: str | Path, **options: Any) -> Path:
+    """Write ``best.png``, a drawing of the run's best layout, into its folder; ``options`` are those of the drawing."""
+    from legible_envs.drawing import save_png
+
+    run = read_run(run_folder)
+    path = run.folder / "best.png"
+    save_png(path, _presenter(run).draw(run.workspace.decode(run.best_genome), run.workspace, **options))
+    return path
+
+
+def _presenter(run: Run) -> Presenter:
+    return presenter_of(str(run.config["workspace"].get("workspace")))
+
+
+def report_data(
+    run: Run,
+    conditions: Sequence[Condition] | None = None,
+    recorded_play: Mapping[str, Any] | None = None,
+) -> dict[str, Any]:
+    """Everything the page shows, as JSON-ready data; this is also what its download button saves."""
+    config, presenter = run.config, _presenter(run)
+    rows, columns = (int(n) for n in config["archive"]["dims"])
+    found = presenter.conditions(run) if conditions is None else conditions
+    return {
+        "schema": 2,
+        "workspace": presenter.name,
+        "place": presenter.place(run.workspace),
+        "words": presenter.words,
+        "objective": dict(config["objective"]),
+        "best": _best(run, presenter),
+        "axes": _axes(run, rows, columns),
+        "cells": _cells(run, presenter, rows, columns),
+        "archive_size": len(run.solution),
+        "archive_dims": [rows, columns],
+        "history": _history(run),
+        "conditions": [_condition(c, presenter, run.workspace) for c in found],
+        "recorded_play": _plain({**_NO_PLAY, **recorded_play}) if recorded_play else None,
+        "config": {key: value for key, value in config.items() if key != "result"},
+        "result": {key: _plain(value) for key, value in (config.get("result") or {}).items() if key != "best_genome"},
+    }
+
+
+_NO_PLAY: dict[str, Any] = {"note": "", "fractions": [], "curves": [], "table": None}
+
+
+# -- the parts of the data ---------------------------------------------------------------------------------------------
+
+
+def _best(run: Run, presenter: Presenter) -> dict[str, Any]:
+    genome = run.best_genome
+    summary = {key: _plain(value) for key, value in run.workspace.summary(genome).items()}
+    return {**summary, "layout": presenter.encode(run.workspace.decode(genome))}
+
+
+def _axes(run: Run, rows: int, columns: int) -> list[dict[str, Any]]:
+    """Names and labels of both axes; ``step`` is how many archive cells share one drawn cell.
+
+    Rows beyond the first and the last one with a layout in it are left out: rooms allow far fewer obstacles than they
+    have cells, and tables no objects that all lie far apart.
+    """
+    archive = run.config["archive"]
+    names = archive.get("measure_names") or ["first measure", "second measure"]
+    filled = min(rows, int(run.index.max()) // columns + 2) if len(run.index) else rows
+    order_names = list(getattr(run.workspace, "order_names", ()))
+    axes = []
+    for i, (name, count, whole, most, labels) in enumerate(
+        (
+            (names[0], filled, rows, MAX_ROWS, None),
+            (names[1], columns, columns, MAX_COLUMNS, order_names if len(order_names) == columns else None),
+        )
+    ):
+        step = math.ceil(whole / most)
+        low, high = archive["ranges"][i] if "ranges" in archive else (-0.5, whole - 0.5)
+        numbers = labels or _cell_labels(low, high, whole)
+        shown = [str(numbers[n]) for n in range(0, count, step)]
+        axes.append({"name": str(name), "count": len(shown), "step": step, "labels": shown, "whole": whole})
+    return axes
+
+
+def _cell_labels(low: float, high: float, count: int) -> list[str]:
+    """For every cell the whole number in its middle, if each has one, else its lower edge."""
+    width = (high - low) / count
+    if math.isclose(width, 1.0) and math.isclose(low % 1.0, 0.5):
+        return [str(round(low + 0.5) + n) for n in range(count)]
+    digits = max(0, math.ceil(-math.log10(width)))
+    return [f"{low + n * width:.{digits}f}" for n in range(count)]
+
+
+def _cells(run: Run, presenter: Presenter, rows: int, columns: int) -> list[list[Any]]:
+    """The archive as ``[row, column, objective, legibility, distance, layout or None]``, best first."""
+    steps = (math.ceil(rows / MAX_ROWS), math.ceil(columns / MAX_COLUMNS))
+    drawn: dict[tuple[int, int], int] = {}
+    for i, index in enumerate(run.index):
+        row, column = divmod(int(index), columns)
+        drawn.setdefault((row // steps[0], column // steps[1]), i)
+    if not drawn:
+        return []
+    genomes = run.solution[list(drawn.values())]
+    legibility, distance = run.workspace.legibility(genomes), run.workspace.distance(genomes)
+    carried = min(MAX_LAYOUTS, presenter.carried(run.workspace, LAYOUT_BYTES))
+    return [
+        [
+            *cell,
+            _plain(run.objective[i]),
+            _plain(legibility[n]),
+            _plain(distance[n]),
+            presenter.encode(run.workspace.decode(genomes[n])) if n < carried else None,
+        ]
+        for n, (cell, i) in enumerate(drawn.items())
+    ]
+
+
+def _history(run: Run) -> dict[str, list[float | None]]:
+    names = ("evaluations", "best", "qd_score", "coverage")
+    length = min((len(run.history[name]) for name in names if name in run.history), default=0)
+    if length == 0 or any(name not in run.history for name in names):
+        return {}
+    picked = np.unique(np.linspace(0, length - 1, min(length, MAX_POINTS)).round().astype(int))
+    return {name: [_plain(v) for v in run.history[name][picked]] for name in names}
+
+
+def _condition(condition: Condition, presenter: Presenter, workspace: Any) -> dict[str, Any]:
+    return {
+        "name": condition.name,
+        "note": condition.note,
+        "layout": presenter.encode(condition.layout),
+        "ways": presenter.ways(workspace, condition.layout),
+        "score": _plain(condition.score),
+        "distance": _plain(condition.distance),
+        "normalised": _plain(condition.normalised),
+        "detour": _plain(condition.detour),
+    }
+
+
+def _reaches(run: Run) -> list[dict[str, Any]]:
+    """Where the best layout loses and wins most, in words."""
+    rows = run.workspace.explain(run.best_genome)
+    worst, best = rows[:WORST_ROWS], rows[WORST_ROWS:][-BEST_ROWS:]
+    return [{str(key): value for key, value in loss_row(row).items()} for row in (*worst, *best)]
+
+
+def _plain(value: Any) -> Any:
+    """The same in types that JSON has; numbers to five digits, NaN and infinities as null."""
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, bool | np.bool_):
+        return bool(value)
+    if isinstance(value, int | np.integer):
+        return int(value)
+    if isinstance(value, float | np.floating):
+        return float(f"{value:.5g}") if math.isfinite(value) else None
+    return value if value is None or isinstance(value, str) else str(value)
+
+
+# -- the page ----------------------------------------------------------------------------------------------------------
+
+
+def _render(data: dict[str, Any], presenter: Presenter, reaches: list[dict[str, Any]], people: str = "") -> str:
+    from jinja2 import Environment, StrictUndefined
+    from markupsafe import Markup
+
+    from legible_envs.overcooked.rendering.palette import PALETTE
+
+    folder = files("benchmarks") / "templates"
+
+    def part(name: str) -> Markup:
+        return Markup((folder / name).read_text(encoding="utf-8"))
+
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters["number"] = _number
+    template = environment.from_string((folder / "report.html.j2").read_text(encoding="utf-8"))
+    return template.render(
+        title=presenter.title(data),
+        lede=_lede(data, presenter),
+        figures=_figures(data, presenter),
+        palette=PALETTE,
+        data=data,
+        words=presenter.words,
+        reaches=reaches,
+        people=Markup(people),
+        best=data["best"],
+        settings=_settings(data["config"]),
+        created=_date(data["config"].get("created")),
+        style=part("report.css"),
+        icons=part(presenter.icons) if presenter.icons else "",
+        drawing=part(presenter.script),
+        script=part("report.js"),
+        payload=Markup(_json_for_script(data)),
+    )
+
+
+def _json_for_script(data: dict[str, Any]) -> str:
+    """JSON that cannot end the script element it stands in, nor begin a comment there."""
+    text = json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False, default=str)
+    return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
+
+
+def _lede(data: dict[str, Any], presenter: Presenter) -> str:
+    """What was found, in two sentences."""
+    best, conditions = data["best"], {c["name"].lower(): c for c in data["conditions"]}
+    digits, unit = presenter.words["distance_digits"], presenter.words["distance_unit"]
+
+    def way(value: Any) -> str:
+        return f"{_number(value, digits)} {unit}"
+
+    score, length = _number(best.get("score")), way(best.get("distance"))
+    if data["objective"]["name"] == "efficiency":
+        text = f"The task of the best {presenter.thing} found takes {length} on average; its legibility is {score}."
+    else:
+        text = f"The best {presenter.thing} found scores {score} in legibility"
+        bounded = data["config"]["workspace"].get("prefix") != "sum"
+        if bounded and (best.get("normalised") or -1) > 0:
+            text += f", {_number(100 * best['normalised'], 0)} % of the highest conceivable score"
+        text += f", and its task takes {length} on average."
+    if "random" in conditions:
+        other = conditions["random"]
+        text += f" A median random one scores {_number(other['score'])} and takes {way(other['distance'])}."
+    if "baseline" in conditions:
+        other = conditions["baseline"]
+        text += f" The sorted baseline scores {_number(other['score'])} and takes {way(other['distance'])}."
+    cap = data["objective"].get("max_distance")
+    return text if cap is None else f"{text} Layouts above a distance of {way(cap)} were not allowed."
+
+
+def _figures(data: dict[str, Any], presenter: Presenter) -> list[tuple[str, str, str]]:
+    """Key figures under the title: name, value, remark."""
+    best, result, config = data["best"], data["result"], data["config"]
+    filled, cells = data["archive_size"], math.prod(data["archive_dims"])
+    evaluations = result.get("evaluations") or (data["history"].get("evaluations") or [None])[-1]
+    single = best.get("single_goal_score")
+    bounded, words = config["workspace"].get("prefix") != "sum", presenter.words
+    return [
+        ("Legibility", _number(best.get("score")), f"{_number(single)} of it from single-goal reaches"),
+        ("Normalised", _number(best.get("normalised")), "of at most 1" if bounded else "per reach"),
+        ("Distance", _number(best.get("distance"), words["distance_digits"]), words["distance"]),
+        *([("Mean detour", _number(best["mean_detour"]), "of the straight line")] if "mean_detour" in best else []),
+        ("Evaluations", _number(evaluations, 0), f"seed {config.get('seed')}"),
+        (
+            "Archive",
+            f"{_number(filled, 0)} layouts",
+            f"{_number(100 * filled / cells, 0)} % of {_number(cells, 0)} cells",
+        ),
+    ]
+
+
+def _settings(config: Mapping[str, Any]) -> list[tuple[str, list[tuple[str, str]]]]:
+    """The manifest as titled lists of name and value, for people."""
+
+    def flat(value: Any, prefix: str = "") -> list[tuple[str, str]]:
+        if isinstance(value, Mapping):
+            return [row for key, item in value.items() for row in flat(item, f"{prefix}{key} ")]
+        text = _words(value)
+        return [(prefix.strip().replace("_", " "), text if len(text) <= 240 else text[:239] + "…")] if text else []
+
+    searched = {key: config.get(key) for key in ("objective", "emitter", "seed", "evaluations", "calibration")}
+    archive = {key: config["archive"].get(key) for key in ("dims", "measure_names")}
+    made = {key: config.get(key) for key in ("created", "git_revision", "platform")}
+    if made["git_revision"]:
+        revision, *dirty = str(made["git_revision"]).split("-")
+        made["git_revision"] = "-".join([revision[:12], *dirty])
+    groups = [
+        ("Search", {**searched, "archive": archive}),
+        ("Workspace", config["workspace"]),
+        ("Versions", {**made, **(config.get("versions") or {})}),
+    ]
+    return [(title, flat(group)) for title, group in groups]
+
+
+def _words(value: Any) -> str:
+    """A setting for reading; empty where nothing was set."""
+    if isinstance(value, list):
+        return ("; " if any(isinstance(item, list) for item in value) else ", ").join(_words(item) for item in value)
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return "" if value is None else str(value)
+
+
+def _date(text: Any) -> str:
+    try:
+        moment = datetime.fromisoformat(str(text))
+    except ValueError:
+        return ""
+    zone = f" {moment.tzname()}" if moment.tzname() else ""
+    return f"{moment.day} {moment:%B %Y, %H:%M}{zone}"
+
+
+def _number(value: Any, digits: int = 2) -> str:
+    """A number for reading: thousands apart, a true minus sign, a dash where there is none."""
+    if value is None:
+        return "–"
+    return f"{value:,.{digits}f}".replace("-", "\u2212").replace(",", "\u202f")

@@ -1,0 +1,88 @@
+"""Cells on a Dask cluster."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from typing import Any
+
+from benchmarks.trials.running import Outcome, run_one
+from benchmarks.trials.store import Cell
+from optimizers.evaluator import connect
+
+__all__ = ["ClusterPool"]
+
+_POLL = 0.5
+"""Seconds after which progress per worker is asked for again."""
+
+
+def run_here(function: str, number: int, cell: Cell) -> Outcome:
+    """One attempt, on a worker of a cluster."""
+    from distributed import get_worker
+
+    return run_one(function, number, cell, str(get_worker().address))
+
+
+class ClusterPool:
+    """Runs cells on the workers of a Dask scheduler, one per thread.
+
+    A lost worker's cells are run elsewhere; results come back to this process, the only one that writes.
+
+    Args:
+        scheduler: Its address.
+    """
+
+    def __init__(self, scheduler: str) -> None:
+        self._client = connect(scheduler)
+        self._queue: deque[tuple[int, Cell]] = deque()
+
+    def run(self, function: str, cells: Iterator[tuple[int, Cell]]) -> Iterator[Outcome | dict[str, Cell]]:
+        """See :class:`~benchmarks.trials.running.Pool`."""
+        from distributed import wait
+
+        self._queue.extend(cells)
+        running: dict[Any, tuple[int, Cell]] = {}
+        try:
+            while self._queue or running:
+                self._submit(function, running)
+                try:
+                    with self._client.as_current():
+                        ended = wait(list(running), timeout=_POLL, return_when="FIRST_COMPLETED").done
+                except TimeoutError:
+                    ended = set()
+                # All at once: what is not fetched before its worker is lost has to be run again.
+                outcomes = [_outcome(future, running.pop(future)[0]) for future in ended]
+                yield self._working(running)
+                yield from sorted(outcomes, key=lambda outcome: outcome.number)
+            yield {}
+        finally:
+            self._client.cancel(list(running))
+            self._client.close()
+
+    def again(self, number: int, cell: Cell) -> None:
+        """See :class:`~benchmarks.trials.running.Pool`."""
+        self._queue.append((number, cell))
+
+    def _submit(self, function: str, running: dict[Any, tuple[int, Cell]]) -> None:
+        """A cell per thread, no more: what is not submitted cannot be lost, nor be stuck behind a slow worker."""
+        room = max(1, sum(self._client.nthreads().values())) - len(running)
+        while self._queue and room > 0:
+            number, cell = self._queue.popleft()
+            running[self._client.submit(run_here, function, number, dict(cell), pure=False)] = (number, cell)
+            room -= 1
+
+    def _working(self, running: dict[Any, tuple[int, Cell]]) -> dict[str, Cell]:
+        """What each worker is at: the first cell it was given and has not ended."""
+        cells = {future.key: cell for future, (_, cell) in running.items()}
+        return {
+            worker: next(cells[key] for key in keys if key in cells)
+            for worker, keys in self._client.processing().items()
+            if any(key in cells for key in keys)
+        }
+
+
+def _outcome(future: Any, number: int) -> Outcome:
+    if future.status == "finished":
+        return future.result()
+    error = future.exception() if future.status == "error" else None
+    return Outcome(number, None, f"the worker was lost: {error or future.status}", 0.0, "")

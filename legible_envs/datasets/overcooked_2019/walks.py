@@ -1,0 +1,95 @@
+"""Walks and counts of recorded games."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from legible_envs.datasets.overcooked_2019.games import RecordedGame
+from legible_envs.overcooked.trajectories import dispensers_in_reach, trajectories
+from legible_envs.rollouts.trajectory import Trajectory
+
+__all__ = ["all_walks", "statistics", "walks_of_games"]
+
+_FULL = 3
+_DISH = 5
+
+
+def all_walks(games: Sequence[RecordedGame]) -> list[Trajectory]:
+    """Every walk, however short, with all dispensers in reach as candidates."""
+    return walks_of_games(games, "all", min_positions=1, min_candidates=1, round_trips=True)
+
+
+def walks_of_games(
+    games: Sequence[RecordedGame], candidate_set: Literal["game", "all"] = "all", **limits: Any
+) -> list[Trajectory]:
+    """Walks of games as trajectories; see :func:`legible_envs.datasets.overcooked_2019.recorded_trajectories`."""
+    if candidate_set not in ("game", "all"):
+        raise ValueError(f"`candidate_set` must be 'game' or 'all', got {candidate_set!r}")
+    return [
+        walk
+        for game in games
+        for walk in trajectories(
+            game.layout,
+            game.cells,
+            game.facing,
+            game.held,
+            game.seconds.astype(np.float64),
+            participants=[game.participant(player) for player in range(game.num_players)],
+            valid_goals=_valid_goals(game) if candidate_set == "game" else None,
+            condition="recorded",
+            layout_name=game.layout_name,
+            **limits,
+        )
+    ]
+
+
+def _valid_goals(game: RecordedGame) -> Callable[[int, int], Collection[str]]:
+    """What empty hands may usefully fetch in the 2019 game: ``legible_envs.overcooked.game.goals`` says the same."""
+    full = game.pots[:, :, :4].sum(axis=2) >= _FULL
+
+    def valid(tick: int, player: int) -> Collection[str]:
+        reach = _pots_in_reach(game, game.cells[tick, player])
+        soups = int((full[tick] & reach).sum()) - int((np.delete(game.held[tick], player) == _DISH).sum())
+        wanted = {"onion"} if (reach & ~full[tick]).any() else set()
+        wanted |= {"dish"} if soups > 0 else set()
+        names = dispensers_in_reach(game.layout, game.cells[tick, player])
+        return [name for name in names if name.partition("@")[0] in wanted]
+
+    return valid
+
+
+def _pots_in_reach(game: RecordedGame, cell: Sequence[int]) -> npt.NDArray[np.bool_]:
+    away = game.layout.distances_from([cell])
+    return np.array([any(away[c] >= 0 for c in game.layout.access(name)) for name in game.layout.named("pot")])
+
+
+def statistics(games: Sequence[RecordedGame]) -> list[dict[str, Any]]:
+    """See :func:`legible_envs.datasets.overcooked_2019.recording_stats`."""
+    names = list(dict.fromkeys(game.layout_name for game in games))
+    groups = [(name, [game for game in games if game.layout_name == name]) for name in names]
+    return [_row(name, group) for name, group in [*groups, ("all", list(games))]]
+
+
+def _row(name: str, games: list[RecordedGame]) -> dict[str, Any]:
+    scored = walks_of_games(games, min_positions=3, min_candidates=2, round_trips=False)
+    idle = [_idle(game) for game in games]
+    return {
+        "layout": name,
+        "games": len(games),
+        "pairs": len({game.pair for game in games}),
+        "ticks": sum(game.num_ticks for game in games),
+        "deliveries": int(sum(game.rewards.sum() for game in games)) // 20,
+        "idle": float(np.concatenate(idle).mean()) if idle else float("nan"),
+        "walks": len(all_walks(games)),
+        "scored_walks": len(scored),
+    }
+
+
+def _idle(game: RecordedGame) -> npt.NDArray[np.bool_]:
+    """``(2T,)`` whether a player's cell, facing and hands stayed as they were."""
+    same = (np.diff(game.cells, axis=0) == 0).all(axis=2)
+    return (same & (np.diff(game.facing, axis=0) == 0) & (np.diff(game.held, axis=0) == 0)).ravel()

@@ -1,0 +1,1 @@
+"""The running game of the kitchen: state vectors, rules, goals, observations, replay."""

@@ -1,0 +1,182 @@
+"""Kernels over many games at once: one row of ``states`` (and of ``kitchens``) per game; see ``vectors``."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from legible_envs.overcooked.game.dynamics import is_over, start, step
+from legible_envs.overcooked.game.goals import find_actions, find_goals
+from legible_envs.overcooked.game.observations import grid_observation, redraw_motion, vector_observation
+from legible_envs.overcooked.game.vectors import AT_PLAYERS, STEPS, Kitchen, Vector
+from legible_envs.support.compiled import kernel
+
+Vectors = npt.NDArray[np.int32]
+
+
+@kernel
+def step_all(
+    states: Vectors,
+    kitchen: Kitchen,
+    rules: Vector,
+    weights: npt.NDArray[np.float64],
+    actions: npt.NDArray[np.int64],
+    rewards: npt.NDArray[np.float64],
+) -> None:
+    """Advance ``T`` states of one kitchen by one tick each.
+
+    Args:
+        states: ``(T, state_size)``, changed in place.
+        kitchen: The kitchen's vector.
+        rules: The rules' vector.
+        weights: ``(5,)`` rewards; see :func:`~legible_envs.overcooked.game.dynamics.step`.
+        actions: ``(T, players)`` joint actions.
+        rewards: ``(T,)``, written.
+    """
+    for t in range(states.shape[0]):
+        rewards[t], _ = step(states[t], kitchen, rules, weights, actions[t])
+
+
+@kernel
+def begin(
+    state: Vector, kitchen: Kitchen, rules: Vector, goals: npt.NDArray[np.bool_], mask: npt.NDArray[np.int8]
+) -> None:
+    """Start one single-player game and say what may be reached for and done first.
+
+    Args:
+        state: ``(state_size,)``, written.
+        kitchen: See ``vectors``.
+        rules: See ``vectors``.
+        goals: ``(H*W,)``, written.
+        mask: ``(6,)``, written.
+    """
+    start(state, kitchen, rules)
+    find_goals(state, kitchen, rules, 0, goals)
+    find_actions(state, kitchen, rules, 0, mask)
+
+
+@kernel
+def play(
+    state: Vector,
+    kitchen: Kitchen,
+    rules: Vector,
+    weights: npt.NDArray[np.float64],
+    actions: npt.NDArray[np.int64],
+    goals: npt.NDArray[np.bool_],
+    mask: npt.NDArray[np.int8],
+) -> tuple[float, bool, bool]:
+    """Advance one single-player game by one tick; returns ``(reward, over, changed)``.
+
+    Args:
+        state: ``(state_size,)``, changed in place.
+        kitchen: See ``vectors``.
+        rules: See ``vectors``.
+        weights: ``(5,)`` rewards; see :func:`~legible_envs.overcooked.game.dynamics.step`.
+        actions: ``(1,)`` action.
+        goals: ``(H*W,)`` goals after the tick before, brought up to date.
+        mask: ``(6,)``, written.
+    """
+    reward, changed = step(state, kitchen, rules, weights, actions)
+    if changed:
+        find_goals(state, kitchen, rules, 0, goals)
+    find_actions(state, kitchen, rules, 0, mask)
+    return reward, is_over(state, rules), changed
+
+
+@kernel
+def play_all(
+    states: Vectors,
+    kitchens: npt.NDArray[np.int16],
+    rules: Vector,
+    weights: npt.NDArray[np.float64],
+    limit: int,
+    actions: npt.NDArray[np.int64],
+    goals: npt.NDArray[np.bool_],
+    drawn: Vector,
+    masks: npt.NDArray[np.int8],
+    rewards: npt.NDArray[np.float64],
+    ends: npt.NDArray[np.bool_],
+    done: npt.NDArray[np.bool_],
+) -> int:
+    """Advance ``N`` single-player games by one tick, or start them anew; returns how many ended.
+
+    Args:
+        states: ``(N, state_size)``, changed in place.
+        kitchens: ``(N, kitchen size)``.
+        rules: One vector for all.
+        weights: ``(5,)`` rewards.
+        limit: Steps after which a game is truncated; 0 means never.
+        actions: ``(N, 1)`` actions; ignored where a game starts anew.
+        goals: ``(N, H*W)`` goals after the tick before, brought up to date.
+        drawn: ``(N,)``, set to -1 where more has changed than :func:`refresh_grids` looks for.
+        masks: ``(N, 6)``, written.
+        rewards: ``(N,)``, written.
+        ends: ``(2, N)``, written: terminated, truncated.
+        done: ``(N,)`` whether to start the game anew instead; then whether it ended.
+    """
+    ended = 0
+    for i in range(states.shape[0]):
+        if done[i]:
+            begin(states[i], kitchens[i], rules, goals[i], masks[i])
+            rewards[i] = 0.0
+            ends[0, i] = ends[1, i] = done[i] = False
+            drawn[i] = -1
+            continue
+        rewards[i], over, changed = play(states[i], kitchens[i], rules, weights, actions[i], goals[i], masks[i])
+        if changed:
+            drawn[i] = -1
+        ends[0, i] = over
+        ends[1, i] = 0 < limit <= states[i, STEPS]
+        done[i] = ends[0, i] or ends[1, i]
+        if done[i]:
+            ended += 1
+    return ended
+
+
+@kernel
+def refresh_grids(
+    states: Vectors,
+    kitchens: npt.NDArray[np.int16],
+    rules: Vector,
+    grids: npt.NDArray[np.uint8],
+    drawn: Vector,
+) -> None:
+    """Bring the ``(N, H, W, C)`` grid observations of ``N`` single-player games up to date.
+
+    Args:
+        states: ``(N, state_size)``.
+        kitchens: ``(N, kitchen size)``.
+        rules: One vector for all.
+        grids: The observations one tick ago, written.
+        drawn: ``(N,)`` cell of the player in ``grids`` where he has done nothing since but move and wait for a pot;
+            -1 where all has to be drawn anew. Written.
+    """
+    for i in range(states.shape[0]):
+        if drawn[i] < 0:
+            grids[i] = 0
+            grid_observation(states[i], kitchens[i], rules, grids[i])
+        else:
+            redraw_motion(states[i], rules, drawn[i], grids[i])
+        drawn[i] = states[i, AT_PLAYERS]
+
+
+@kernel
+def vector_observations(
+    states: Vectors,
+    kitchens: npt.NDArray[np.int16],
+    rules: Vector,
+    routes: npt.NDArray[np.int16],
+    out: npt.NDArray[np.float32],
+) -> None:
+    """Write the ``(N, D)`` vector observations of ``N`` games; ``routes`` ``(N, 7, 2, H*W)``, ``out`` zeros."""
+    for i in range(states.shape[0]):
+        vector_observation(states[i], kitchens[i], rules, routes[i], out[i])
+
+
+@kernel
+def all_within(values: npt.NDArray[np.int64], end: int) -> bool:
+    """Whether all integers lie in ``0 .. end - 1``."""
+    for value in values:
+        if value < 0 or value >= end:
+            return False
+    return True

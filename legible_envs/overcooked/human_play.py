@@ -1,0 +1,300 @@
+"""Cook in a kitchen yourself: a window, a keyboard, and a record of what was done."""
+
+from __future__ import annotations
+
+import json
+import os
+import warnings
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+import gymnasium as gym
+import numpy as np
+import numpy.typing as npt
+
+from legible_envs.overcooked.layout import INGREDIENTS, OvercookedLayout
+from legible_envs.overcooked.recipes import PAPER_SOUPS, Recipe, check_recipes
+from legible_envs.support.files import write_npz
+
+__all__ = ["Played", "load_played", "play", "recipes_for"]
+
+ENV_ID: Final = "LegibleOvercooked-v0"
+STAY: Final = 4
+INTERACT: Final = 5
+_POLLS_PER_SECOND: Final = 60
+_QUEUE: Final = 2  # more taps than this ahead of the game would make it feel slow to answer
+_SCHEMA: Final = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Played:
+    """What a person did.
+
+    Attributes:
+        layout: The kitchen.
+        recipes: The ordered soups.
+        virtual_obstacles: ``"hard"`` or ``"soft"``.
+        seed: Seed of the first game, or None.
+        actions: ``(T,)`` int8, the action of every step.
+        episodes: ``(T,)`` int32, which game the step belongs to, from 0.
+        rewards: ``(T,)`` float64.
+    """
+
+    layout: OvercookedLayout
+    recipes: tuple[Recipe, ...]
+    virtual_obstacles: str = "hard"
+    seed: int | None = None
+    actions: npt.NDArray[np.int8] = field(default_factory=lambda: np.zeros(0, np.int8))
+    episodes: npt.NDArray[np.int32] = field(default_factory=lambda: np.zeros(0, np.int32))
+    rewards: npt.NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write an ``.npz`` that :func:`load_played` reads; the name is used as given.
+
+        Raises:
+            OSError: The place cannot be written to; a file that was there stays.
+        """
+        about = {
+            "schema": _SCHEMA,
+            "env": ENV_ID,
+            "layout": self.layout.to_ascii(),
+            "recipes": self.recipes,
+            "virtual_obstacles": self.virtual_obstacles,
+            "seed": self.seed,
+        }
+        arrays = {"actions": self.actions, "episodes": self.episodes, "rewards": self.rewards}
+        write_npz(path, {"about": np.array(json.dumps(about)), **arrays})
+
+    def make_env(self, render_mode: str | None = None) -> gym.Env[Any, Any]:
+        """The environment it was played in; the recorded actions give the recorded rewards again."""
+        return gym.make(
+            f"legible_envs:{ENV_ID}",
+            shape=self.layout.shape,
+            layout=self.layout.to_ascii(),
+            recipes=self.recipes,
+            virtual_obstacles=self.virtual_obstacles,
+            render_mode=render_mode,
+        )
+
+
+def load_played(path: str | os.PathLike[str]) -> Played:
+    """Read what :func:`play` recorded.
+
+    Raises:
+        OSError: No such file.
+        ValueError: The file is something else.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as arrays:
+            about = json.loads(str(arrays["about"]))
+            if about["schema"] != _SCHEMA:
+                raise ValueError(f"schema {about['schema']!r}, expected {_SCHEMA}")
+            actions, episodes, rewards = (arrays[name] for name in ("actions", "episodes", "rewards"))
+            if actions.ndim != 1 or not actions.shape == episodes.shape == rewards.shape:
+                raise ValueError("actions, episodes and rewards differ in length")
+            return Played(
+                OvercookedLayout.from_ascii(about["layout"]),
+                check_recipes(about["recipes"]),
+                about["virtual_obstacles"],
+                about["seed"],
+                actions.astype(np.int8),
+                episodes.astype(np.int32),
+                rewards.astype(np.float64),
+            )
+    except OSError:
+        raise
+    except Exception as error:
+        raise ValueError(f"{os.fspath(path)} is no recorded play: {error}") from error
+
+
+def recipes_for(layout: OvercookedLayout) -> tuple[Recipe, ...]:
+    """Soups that can be cooked in a kitchen: the paper's whose ingredients are there, else three of each ingredient."""
+    there = {kind for kind in INGREDIENTS if any(layout.access(name) for name in layout.named(kind))}
+    known = tuple(soup for soup in PAPER_SOUPS if there >= set(soup))
+    return known or tuple((kind,) * 3 for kind in INGREDIENTS if kind in there) or PAPER_SOUPS
+
+
+def play(
+    layout: OvercookedLayout | str | Sequence[str],
+    *,
+    recipes: Sequence[Sequence[str]] | None = None,
+    fps: int = 8,
+    record: str | os.PathLike[str] | None = None,
+    virtual_obstacles: str = "hard",
+    seed: int | None = None,
+    zoom: float | None = None,
+) -> Played:
+    """Open a window and cook: arrow keys or W A S D to walk, space or E to interact, Esc to end.
+
+    The game runs in real time, as the recorded games of Overcooked-AI did; it starts with the first key, and another
+    one starts after it. A walking key repeats while it is held, a tap shorter than a step still counts, and
+    interacting happens once per tap.
+
+    Args:
+        layout: The kitchen; also a drawing or a list of rows.
+        recipes: The ordered soups; None takes those of :func:`recipes_for`.
+        fps: Steps per second.
+        record: Where to write the actions (``.npz``), also when the window is closed or the game is
+            interrupted; not written if no step was played.
+        virtual_obstacles: ``"hard"`` or ``"soft"`` (can be crossed, crossings are counted).
+        seed: Seed of the first game.
+        zoom: Enlargement of the picture.
+
+    Returns:
+        What was played.
+
+    Raises:
+        LayoutError: A kitchen in which the soups cannot be cooked.
+        OSError: The recording cannot be written; checked before the game begins.
+        RuntimeError: There is no screen to open a window on.
+        ValueError: A bad number of steps per second.
+    """
+    if not 1 <= fps <= _POLLS_PER_SECOND:
+        raise ValueError(f"fps must be 1 to {_POLLS_PER_SECOND} steps per second, got {fps!r}")
+    if isinstance(layout, str):
+        layout = OvercookedLayout.from_ascii(layout)
+    elif not isinstance(layout, OvercookedLayout):
+        layout = OvercookedLayout.from_rows(layout)
+    soups = check_recipes(recipes_for(layout) if recipes is None else recipes)
+    setting = Played(layout, soups, virtual_obstacles, seed)
+    if record is not None:
+        _check_writable(Path(record))
+    env = setting.make_env("rgb_array")
+    steps: list[tuple[int, int, float]] = []
+    try:
+        _Table(env, fps, zoom, seed, steps).run()
+    except KeyboardInterrupt:
+        pass  # a way to end like any other
+    finally:
+        env.close()
+        actions, episodes, rewards = zip(*steps, strict=True) if steps else ((), (), ())
+        played = Played(
+            layout,
+            soups,
+            virtual_obstacles,
+            seed,
+            np.array(actions, np.int8),
+            np.array(episodes, np.int32),
+            np.array(rewards, np.float64),
+        )
+        if record is not None and steps:  # an earlier recording is not replaced by nothing
+            played.save(record)
+    return played
+
+
+def _check_writable(path: Path) -> None:
+    """Fail now rather than after an hour of play."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if path.is_dir():
+        raise IsADirectoryError(f"{path} is a folder; name a file to record to")
+    if not os.access(path.parent, os.W_OK):
+        raise PermissionError(f"cannot write to the folder {path.parent}")
+
+
+class _Table:
+    """A window on an environment: Gymnasium's playable game, with taps that count and keys that repeat."""
+
+    def __init__(
+        self,
+        env: gym.Env[Any, Any],
+        fps: int,
+        zoom: float | None,
+        seed: int | None,
+        steps: list[tuple[int, int, float]],
+    ) -> None:
+        from legible_envs.overcooked.rendering import load_pygame
+
+        self._pygame = load_pygame()
+        with warnings.catch_warnings():  # Gymnasium says on import that it would like matplotlib for plots
+            warnings.simplefilter("ignore")
+            from gymnasium.utils import play as gym_play
+        self._env, self._fps, self._steps, self._show = env, fps, steps, gym_play.display_arr
+        self._keys: dict[int, int] = {
+            key: action for (key,), action in env.get_wrapper_attr("get_keys_to_action")().items()
+        }
+        self._taps: deque[int] = deque(maxlen=_QUEUE)
+        self._held: list[int] = []
+        env.reset(seed=seed)
+        try:
+            self._pygame.display.init()
+            self._game = gym_play.PlayableGame(env, {(key,): action for key, action in self._keys.items()}, zoom)
+        except self._pygame.error as error:
+            raise RuntimeError(f"cannot open a window to play in: {error}") from error
+        self._pygame.display.set_caption("Legible kitchen")
+
+    def run(self) -> None:
+        """Play games until the window is closed."""
+        episode = 0
+        try:
+            self._wait("Cook the orders!", "Arrow keys or WASD: walk", "Space: take, put, serve", "Esc: end")
+            while self._game.running:
+                delivered, steps = self._play_one(episode)
+                if self._game.running:
+                    self._wait(f"{delivered} soups in {steps} steps", "Any key: play again", "Esc: end")
+                    self._env.reset()
+                    episode += 1
+        finally:
+            self._pygame.quit()
+
+    def _play_one(self, episode: int) -> tuple[int, int]:
+        clock, polls = self._pygame.time.Clock(), max(1, round(_POLLS_PER_SECOND / self._fps))
+        info: dict[str, Any] = {}
+        steps, over = 0, False
+        self._draw()
+        while self._game.running and not over:
+            for _ in range(polls):
+                self._poll()
+                clock.tick(self._fps * polls)
+            if self._game.running:
+                action = self._next_action()
+                _, reward, terminated, truncated, info = self._env.step(action)
+                self._steps.append((action, episode, float(reward)))
+                steps, over = steps + 1, terminated or truncated
+                self._draw()
+        return int(info.get("deliveries", 0)), steps
+
+    def _wait(self, *lines: str) -> None:
+        """Show a message until a key is pressed or the window closed."""
+        clock = self._pygame.time.Clock()
+        self._taps.clear()
+        pressed = False
+        while self._game.running and not pressed:
+            self._draw(lines)
+            pressed = self._poll()
+            clock.tick(_POLLS_PER_SECOND // 2)
+        self._taps.clear()
+        self._held.clear()
+
+    def _poll(self) -> bool:
+        """Take in what happened at the keyboard and the window; whether a key went down."""
+        pressed = False
+        for event in self._pygame.event.get():
+            self._game.process_event(event)
+            if event.type == self._pygame.KEYDOWN:
+                pressed = True
+                if event.key in self._keys:
+                    self._taps.append(self._keys[event.key])
+                    self._held.append(event.key)
+            elif event.type == self._pygame.KEYUP and event.key in self._held:
+                self._held.remove(event.key)
+            elif event.type == self._pygame.WINDOWFOCUSLOST:
+                self._held.clear()
+        return pressed
+
+    def _next_action(self) -> int:
+        if self._taps:
+            return self._taps.popleft()
+        walking = [self._keys[key] for key in self._held if self._keys[key] != INTERACT]
+        return walking[-1] if walking else STAY
+
+    def _draw(self, lines: Sequence[str] = ()) -> None:
+        from legible_envs.drawing.sheets import overlay
+
+        picture: Any = self._env.render()
+        if lines:
+            picture = overlay(picture, lines, 48)
+        self._show(self._game.screen, picture, transpose=True, video_size=self._game.video_size)
+        self._pygame.display.flip()

@@ -1,0 +1,5 @@
+"""Simulated people in kitchens: how they walk, whole participants, and their fit to recorded play."""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

@@ -1,0 +1,245 @@
+"""How rational people walk: the local softmax walker, fitted to trajectories by maximum likelihood."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from legible_envs.overcooked.humans.kernels import Way, beside, find_costs, is_option
+from legible_envs.overcooked.layout import FLOOR, OvercookedLayout
+from legible_envs.rollouts.trajectory import Trajectory
+
+__all__ = ["RationalityFit", "RationalitySpread", "fit_rationality", "make_way", "rationality_spread"]
+
+Floats = npt.NDArray[np.float64]
+
+_GREATEST = 50.0
+"""Rationality at which a detour of two steps has odds of 1e-43: nothing is learned from looking further."""
+
+
+@dataclass(frozen=True)
+class RationalityFit:
+    """Maximum likelihood estimate of the rationality of a local softmax walker.
+
+    Attributes:
+        rationality: Per unit of path cost; 0 where people walk no better than at random, ``inf`` where every step was a
+            best one.
+        interval: Profile likelihood interval: all values that a likelihood ratio test does not reject. It takes steps
+            as independent.
+        standard_error: From the observed information, steps independent; NaN at 0 and ``inf``.
+        clustered_error: The same, robust to the likeness of steps of one participant; NaN for a single participant.
+        confidence: Of the interval.
+        log_likelihood: At the estimate.
+        num_steps: Steps taken, the one into the station included.
+        num_walks: Trajectories.
+        num_participants: Different participants.
+    """
+
+    rationality: float
+    interval: tuple[float, float]
+    standard_error: float
+    clustered_error: float
+    confidence: float
+    log_likelihood: float
+    num_steps: int
+    num_walks: int
+    num_participants: int
+
+
+@dataclass(frozen=True)
+class RationalitySpread:
+    """How much people differ in rationality.
+
+    Attributes:
+        median: Median person, ``exp(mean of log rationality)``.
+        sd: Standard deviation of log rationality between people, the error of each estimate taken out.
+        raw_sd: The same with these errors left in.
+        fits: Fit of each participant.
+    """
+
+    median: float
+    sd: float
+    raw_sd: float
+    fits: dict[str, RationalityFit]
+
+
+@dataclass(frozen=True)
+class _Steps:
+    """``excess [m, 4]``: cost of each option over the best one, inf where there is none; ``taken [m]``; ``who [m]``."""
+
+    excess: Floats
+    taken: Floats
+    who: npt.NDArray[np.intp]
+
+    def log_likelihood(self, rationality: float) -> float:
+        with np.errstate(invalid="ignore"):
+            scaled = np.where(np.isfinite(self.excess), rationality * self.excess, np.inf)
+        return float(-(rationality * self.taken).sum() - np.log(np.exp(-scaled).sum(axis=1)).sum())
+
+    def scores(self, rationality: float) -> tuple[Floats, Floats]:
+        """``(m,)`` derivative of each step's log-likelihood, and ``(m,)`` its negative second derivative."""
+        finite = np.where(np.isfinite(self.excess), self.excess, 0.0)
+        odds = np.where(np.isfinite(self.excess), np.exp(-rationality * finite), 0.0)
+        odds /= odds.sum(axis=1, keepdims=True)
+        mean = (odds * finite).sum(axis=1)
+        return mean - self.taken, (odds * finite**2).sum(axis=1) - mean**2
+
+
+def fit_rationality(
+    trajectories: Iterable[Trajectory],
+    *,
+    confidence: float = 0.95,
+    cell_costs: npt.ArrayLike | None = None,
+) -> RationalityFit:
+    r"""Fit the rationality of :class:`~legible_envs.overcooked.humans.BoltzmannWalker`.
+
+    Every step counts, from floor cell to floor cell and into the goal station; where people stand first, and how long,
+    does not. The log-likelihood is concave, so the estimate is the only one.
+
+    Args:
+        trajectories: Walks with a layout and a goal, consecutive repeats dropped.
+        confidence: Of the interval, in (0, 1).
+        cell_costs: ``(H, W)`` cost of stepping on each cell, 1 if None; walks must then be of one shape of kitchen.
+
+    Raises:
+        ValueError: No step with a choice; a walk without layout or goal, that does not fit its layout, or that jumps.
+
+    Example:
+        >>> from legible_envs.overcooked import OvercookedLayout
+        >>> kitchen = OvercookedLayout.from_ascii("XOXXX\nX   X\nXXXSX")
+        >>> there_and_back = [(1, 3), (1, 2), (1, 3), (1, 2), (1, 1), (0, 1)]
+        >>> walk = Trajectory(there_and_back, goal="onion", candidates=("onion",), layout=kitchen)
+        >>> round(fit_rationality([walk]).rationality, 3)
+        0.347
+    """
+    walks = list(trajectories)
+    if not 0 < confidence < 1:
+        raise ValueError(f"`confidence` must be in (0, 1), got {confidence!r}")
+    names = sorted({walk.participant for walk in walks})
+    steps = _collect(walks, names, cell_costs)
+    return _fit(steps, confidence, len(walks), len(names))
+
+
+def rationality_spread(
+    trajectories: Iterable[Trajectory], *, confidence: float = 0.95, min_walks: int = 10
+) -> RationalitySpread:
+    """How much participants differ in rationality.
+
+    Args:
+        trajectories: As for :func:`fit_rationality`; of one kitchen, or kitchens that everybody walked in.
+        confidence: Of each interval.
+        min_walks: Participants with fewer walks are left out.
+
+    Raises:
+        ValueError: Fewer than two participants with enough walks and an estimate that is neither 0 nor infinite.
+    """
+    by_name: dict[str, list[Trajectory]] = {}
+    for walk in trajectories:
+        by_name.setdefault(walk.participant, []).append(walk)
+    fits = {
+        name: fit_rationality(walks, confidence=confidence)
+        for name, walks in sorted(by_name.items())
+        if len(walks) >= min_walks
+    }
+    usable = [fit for fit in fits.values() if 0 < fit.rationality < math.inf]
+    if len(usable) < 2:
+        raise ValueError(f"a spread needs two participants with {min_walks} walks each; got {len(usable)}")
+    logs = np.log([fit.rationality for fit in usable])
+    errors = np.array([fit.standard_error / fit.rationality for fit in usable])
+    variance = float(logs.var(ddof=1))
+    between = max(0.0, variance - float((errors**2).mean()))
+    return RationalitySpread(float(np.exp(logs.mean())), math.sqrt(between), math.sqrt(variance), fits)
+
+
+def _collect(walks: Sequence[Trajectory], names: Sequence[str], cell_costs: npt.ArrayLike | None) -> _Steps:
+    ways: dict[tuple[object, str], Way] = {}
+    excess, taken, who = [], [], []
+    for number, walk in enumerate(walks):
+        if not isinstance(walk.layout, OvercookedLayout) or walk.goal is None or not walk.is_grid:
+            raise ValueError(f"walk {number} has no kitchen, no goal, or positions instead of cells")
+        key = walk.layout, walk.goal
+        if key not in ways:
+            ways[key] = make_way(walk.layout, walk.layout.stations[walk.goal], cell_costs)
+        way = ways[key]
+        cells = [int(row) * way.width + int(col) for row, col in walk.states.tolist()]
+        for i, (before, after) in enumerate(itertools.pairwise(cells)):
+            options = [beside(before, direction, way.height, way.width) for direction in range(4)]
+            if not way.floor[before] or after not in options or not is_option(after, way):
+                (a, b), (c, d) = divmod(before, way.width), divmod(after, way.width)
+                raise ValueError(
+                    f"walk {number}: the step after state {i}, from row {a}, column {b} to row {c}, column {d}, is "
+                    f"not to a neighbouring floor cell or into {walk.goal!r}"
+                )
+            costs = np.array([_cost(option, way) for option in options])
+            excess.append(costs - costs.min())
+            taken.append(_cost(after, way) - costs.min())
+            who.append(names.index(walk.participant))
+    table = np.array(excess).reshape(-1, 4)
+    if not len(table) or not (np.isfinite(table).sum(axis=1) > 1).any():
+        raise ValueError(f"{len(walks)} walks have no step at which there was a choice")
+    return _Steps(table, np.array(taken), np.array(who, dtype=np.intp))
+
+
+def _cost(cell: int, way: Way) -> float:
+    if not is_option(cell, way):
+        return math.inf
+    return 1.0 if cell == way.station else float(way.costs[cell] + way.best[cell])
+
+
+def make_way(layout: OvercookedLayout, station: Sequence[int], cell_costs: npt.ArrayLike | None = None) -> Way:
+    """The way to a station of a layout for the kernels.
+
+    Raises:
+        ValueError: Costs of another shape, or costs of floor cells that are not positive and finite.
+    """
+    height, width = layout.shape
+    floor = (layout.cells == FLOOR).ravel()
+    costs = np.ones(layout.shape) if cell_costs is None else np.array(cell_costs, dtype=np.float64)
+    if costs.shape != layout.shape:
+        raise ValueError(f"cell costs must have the kitchen's shape {layout.shape}, got {costs.shape}")
+    if not np.isfinite(costs.ravel()[floor]).all() or (costs.ravel()[floor] <= 0).any():
+        raise ValueError("cell costs of floor cells must be finite and greater than 0")
+    best = np.empty(height * width)
+    target = int(station[0]) * width + int(station[1])
+    find_costs(height, width, floor, costs.ravel(), target, best)
+    return Way(height, width, floor, costs.ravel(), target, best)
+
+
+def _fit(steps: _Steps, confidence: float, num_walks: int, num_participants: int) -> RationalityFit:
+    from scipy.optimize import brentq
+    from scipy.stats import chi2
+
+    def slope(rationality: float) -> float:
+        return float(steps.scores(rationality)[0].sum())
+
+    if (steps.taken <= 1e-12).all():
+        best = math.inf
+    elif slope(0.0) <= 0:
+        best = 0.0
+    else:
+        best = float(brentq(slope, 0.0, _GREATEST, xtol=1e-10))
+    # At infinity only the ties between best steps are left to chance.
+    greatest = steps.log_likelihood(min(best, _GREATEST))
+    threshold = greatest - float(chi2.ppf(confidence, 1)) / 2
+
+    def above(rationality: float) -> float:
+        return steps.log_likelihood(rationality) - threshold
+
+    low = 0.0 if best == 0.0 or above(0.0) >= 0 else float(brentq(above, 0.0, min(best, _GREATEST)))
+    high = math.inf if best == math.inf or above(_GREATEST) >= 0 else float(brentq(above, best, _GREATEST))
+    error = clustered = math.nan
+    if 0 < best < math.inf:
+        scores, information = steps.scores(best)
+        error = 1 / math.sqrt(information.sum())
+        if num_participants > 1:
+            by_person = np.bincount(steps.who, scores, minlength=num_participants)
+            correction = num_participants / (num_participants - 1)
+            clustered = math.sqrt(correction * float((by_person**2).sum())) / float(information.sum())
+    return RationalityFit(
+        best, (low, high), error, clustered, confidence, greatest, len(steps.taken), num_walks, num_participants
+    )

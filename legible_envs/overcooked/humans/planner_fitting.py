@@ -1,0 +1,202 @@
+"""People fitted to recorded play: the noisily rational walker, and the planner."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from legible_envs.overcooked.humans.fitting import fit_rationality, make_way, rationality_spread
+from legible_envs.overcooked.humans.kernels import Way
+from legible_envs.overcooked.humans.simulation import BoltzmannWalker, PlannerWalker, Walker
+
+if TYPE_CHECKING:
+    from legible_envs.rollouts.trajectory import Trajectory
+
+__all__ = ["PlannerFit", "best_slip", "draw_person", "fit_boltzmann", "fit_planner"]
+
+Floats = npt.NDArray[np.float64]
+Recorded = list[tuple[npt.NDArray[np.int64], Way, str]]
+
+GRID: Final[Mapping[str, tuple[float, ...]]] = {
+    "depth": (2, 3, 4),
+    "turn_cost": (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0),
+    "recency": (0.5, 1.0, 2.0, 3.0, 4.0),
+    "fade": (0.5, 0.7, 0.8, 0.9, 0.95),
+}
+"""Values of the planner's parameters that are tried. Costs decide what is best alone, not by how much: between two
+values of the grid the likelihood hardly changes, but in steps, so that nothing smooth could be climbed. Who looks one
+step ahead would fit the recorded kitchens, which have no dead ends, better still, and lose their way for hundreds of
+steps among virtual obstacles; two is the least."""
+MIN_WALKS: Final = 10
+"""Whoever walked less often is not fitted alone."""
+
+
+@dataclass(frozen=True)
+class PlannerFit:
+    """Maximum likelihood estimates of the planner.
+
+    Attributes:
+        depth: Steps looked ahead, the best of ``GRID``, as all but the slips.
+        turn_cost: Of all people together.
+        recency: Of all people together.
+        fade: Of all people together.
+        slip: Of all people together.
+        log_likelihood: Of all steps, at these.
+        num_steps: Steps taken.
+        people: ``{participant: (turn_cost, slip)}``, the rest as for all.
+    """
+
+    depth: int
+    turn_cost: float
+    recency: float
+    fade: float
+    slip: float
+    log_likelihood: float
+    num_steps: int
+    people: dict[str, tuple[float, float]]
+
+
+def fit_boltzmann(walks: Sequence[Trajectory]) -> list[dict[str, Any]]:
+    """The rationality of recorded people.
+
+    Returns:
+        A row for all of them (``median``, ``spread`` between people on the log scale with the error of each estimate
+        taken out, and the ``log_likelihood`` of all steps at one common rationality), with empty ``participant``; then
+        one for each person with ``rationality``.
+    """
+    spread = rationality_spread(walks, min_walks=MIN_WALKS)
+    common = fit_rationality(walks)
+    whole = {
+        "walker": "boltzmann",
+        "participant": "",
+        "rationality": spread.median,
+        "spread": spread.sd,
+        "log_likelihood": common.log_likelihood,
+        "steps": common.num_steps,
+        "walks": common.num_walks,
+        "people": common.num_participants,
+    }
+    each = [
+        {"walker": "boltzmann", "participant": name, "rationality": fit.rationality, "walks": fit.num_walks}
+        for name, fit in spread.fits.items()
+    ]
+    return [whole, *each]
+
+
+def fit_planner(walks: Sequence[Trajectory], grid: Mapping[str, Sequence[float]] = GRID) -> PlannerFit:
+    """Fit the planner to recorded walks.
+
+    All parameters are fitted for everybody together, one after the other over a grid until none is better changed alone
+    (the rate of slips exactly, for each); then each person's own cost of turning and rate of slips.
+
+    Args:
+        walks: Walks with a kitchen, a goal and a participant.
+        grid: Values tried.
+    """
+    recorded = _prepared(walks)
+    who = np.repeat([name for *_, name in recorded], [len(path) - 1 for path, *_ in recorded])
+    seen: dict[tuple[float, ...], tuple[Floats, Floats]] = {}
+
+    def steps(values: Mapping[str, float]) -> tuple[Floats, Floats]:
+        key = tuple(values[name] for name in grid)
+        if key not in seen:
+            seen[key] = _step_probabilities(recorded, np.array([*key, 0.0]))
+        return seen[key]
+
+    best = {name: values[0] for name, values in grid.items()}
+    slip, value = best_slip(*steps(best))
+    moved = True
+    while moved:
+        moved = False
+        for name, values in grid.items():
+            for other in values:
+                found = best_slip(*steps({**best, name: other}))
+                if found[1] > value + 1e-9:
+                    best, (slip, value), moved = {**best, name: other}, found, True
+    turning = [(turn, *steps({**best, "turn_cost": turn})) for turn in grid["turn_cost"]]
+    people = {}
+    for name, number in Counter(walk.participant for walk in walks).items():
+        if number >= MIN_WALKS:
+            own = [(turn, *best_slip(planned[who == name], slipped[who == name])) for turn, planned, slipped in turning]
+            turn, own_slip, _ = max(own, key=lambda fit: fit[2])
+            people[name] = (float(turn), own_slip)
+    return PlannerFit(
+        int(best["depth"]), best["turn_cost"], best["recency"], best["fade"], slip, value, len(who), people
+    )
+
+
+def best_slip(planned: Floats, slipped: Floats) -> tuple[float, float]:
+    """The rate of slips that makes steps most likely, and their log-likelihood; it is concave in the rate.
+
+    Args:
+        planned: ``(m,)`` probability of each step for who never slips.
+        slipped: ``(m,)`` for who steps anywhere.
+    """
+    from scipy.optimize import minimize_scalar
+
+    def loss(slip: float) -> float:
+        return -float(np.log((1 - slip) * planned + slip * slipped).sum())
+
+    found = minimize_scalar(loss, bounds=(1e-6, 1.0), method="bounded", options={"xatol": 1e-6})
+    return float(found.x), -float(found.fun)
+
+
+def _prepared(walks: Sequence[Trajectory]) -> Recorded:
+    """Paths as cell numbers, the way to each goal, and who walked."""
+    from legible_envs.overcooked.layout import OvercookedLayout
+
+    ways: dict[tuple[object, str], Way] = {}
+    found: Recorded = []
+    for walk in walks:
+        if not isinstance(walk.layout, OvercookedLayout) or walk.goal is None:
+            raise ValueError("walks to fit people on need a kitchen and a goal")
+        key = walk.layout, walk.goal
+        if key not in ways:
+            ways[key] = make_way(walk.layout, walk.layout.stations[walk.goal])
+        path = walk.states[:, 0].astype(np.int64) * walk.layout.shape[1] + walk.states[:, 1]
+        found.append((path.astype(np.int64), ways[key], walk.participant))
+    return found
+
+
+def _step_probabilities(recorded: Recorded, numbers: Floats) -> tuple[Floats, Floats]:
+    """``(m,)`` each of all steps of all walks, as :func:`step_probabilities` gives them."""
+    from legible_envs.overcooked.humans.kernels import step_probabilities
+
+    ends = np.cumsum([0, *(len(path) - 1 for path, *_ in recorded)])
+    planned, slipped = np.empty(ends[-1]), np.empty(ends[-1])
+    for (path, way, _), a, b in zip(recorded, ends, ends[1:], strict=False):
+        step_probabilities(path, way, numbers, planned[a:b], slipped[a:b])
+    return planned, slipped
+
+
+def draw_person(people: Mapping[str, Any]) -> Callable[..., Walker]:
+    """What draws a person for :func:`~legible_envs.overcooked.humans.simulate_participants`.
+
+    Args:
+        people: Plain data: ``walker`` and its numbers, as :func:`benchmarks.experiments.overcooked.sweep.people_of`
+            makes them. Boltzmann people have lognormal rationality; planners the cost of turning and the slips of one
+            recorded person each, drawn at random.
+    """
+    kind, preference = people["walker"], float(people["preference"])
+    if kind == "boltzmann":
+
+        def draw(shape: tuple[int, int], rng: np.random.Generator) -> Walker:
+            return BoltzmannWalker.draw(
+                shape, rng, rationality=people["rationality"], spread=people["spread"], preference=preference
+            )
+
+    elif kind == "planner":
+
+        def draw(shape: tuple[int, int], rng: np.random.Generator) -> Walker:
+            turn_cost, slip = people["people"][int(rng.integers(len(people["people"])))]
+            numbers = {key: people[key] for key in ("depth", "recency", "fade")}
+            return PlannerWalker.draw(shape, rng, preference=preference, turn_cost=turn_cost, slip=slip, **numbers)
+
+    else:
+        raise ValueError(f"people are 'boltzmann' or 'planner', got {kind!r}")
+    return draw

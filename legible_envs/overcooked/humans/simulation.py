@@ -1,0 +1,280 @@
+"""Simulated people in kitchens: two kinds of walkers, people who differ, and whole task executions.
+
+:class:`BoltzmannWalker` is the noisily rational walker that ``human="boltzmann"`` scores and
+:func:`fit_rationality` fits to recorded play. :class:`PlannerWalker` errs for other reasons: it sees only a few steps
+ahead, dislikes turning, and avoids where it has just been. A layout, or a predictor, that was made with one model of
+people should be judged with the other, too.
+
+Both walk from station to station: floor cells, then the goal station. Time passes in ticks. Before each step a person
+stands idle or looks around for a while (each tick with probability ``idle`` and ``turn``); a step takes a tick and
+turns the person, using the goal takes one, and one more where the person does not face it. In recorded play a walk's
+ticks are moves (23 %), turns on the spot (6 %), idle (63 %) and uses of stations.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, Final, Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from legible_envs.errors import LayoutError
+from legible_envs.overcooked.humans.fitting import (
+    RationalityFit,
+    RationalitySpread,
+    fit_rationality,
+    rationality_spread,
+)
+from legible_envs.overcooked.humans.kernels import BOLTZMANN, PLANNER
+from legible_envs.overcooked.humans.walker import Walker, draw_one, draw_preferences, in_reach
+from legible_envs.overcooked.layout import OvercookedLayout
+from legible_envs.overcooked.recipes import soup_task
+from legible_envs.overcooked.scoring.boltzmann import DEFAULT_RATIONALITY
+from legible_envs.rollouts.trajectory import Trajectory
+from legible_envs.support.validation import check_finite
+from legible_envs.tasks import TaskGraph
+
+__all__ = [
+    "BoltzmannWalker",
+    "PlannerWalker",
+    "RationalityFit",
+    "RationalitySpread",
+    "Walker",
+    "fit_rationality",
+    "rationality_spread",
+    "simulate_participants",
+]
+
+Floats = npt.NDArray[np.float64]
+
+
+class BoltzmannWalker(Walker):
+    r"""A noisily rational person: a local softmax over steps.
+
+    From floor cell ``a``, the next step leads to ``b`` with probability
+    ``P(b | a, G) ∝ exp(-rationality * (cost(b) + C*(b -> G)))``, where ``b`` is a free neighbouring cell (back, too)
+    or, where it is beside ``a``, the goal station with ``cost = 1`` and ``C* = 0``. Standing still is no step: time is
+    another matter (see :class:`Walker`). With ``preferences`` costs are this person's own; an observer who does not
+    know them sees a person of unusual habits.
+
+    Args:
+        rationality: Per unit of cost; 0 walks at random. 1.1 to 1.7 in recorded play.
+        preferences: See :class:`Walker`.
+        idle: See :class:`Walker`.
+        turn: See :class:`Walker`.
+        tick: See :class:`Walker`.
+
+    Example:
+        >>> import numpy as np
+        >>> kitchen = OvercookedLayout.from_ascii("XOXXTX\nX    X\nXXXXSX")
+        >>> BoltzmannWalker(rationality=9).walk(kitchen, "serving", "onion", np.random.default_rng(0))
+        [(1, 4), (1, 3), (1, 2), (1, 1), (0, 1)]
+    """
+
+    kind = BOLTZMANN
+
+    def __init__(self, rationality: float = DEFAULT_RATIONALITY, **arguments: Any) -> None:
+        super().__init__(**arguments)
+        self.rationality = check_finite("rationality", rationality, minimum=0.0)
+
+    @property
+    def numbers(self) -> Floats:
+        """``[rationality]``."""
+        return np.array([self.rationality])
+
+    def _parameters(self) -> tuple[str, ...]:
+        return ("rationality", *super()._parameters())
+
+    @classmethod
+    def draw(
+        cls,
+        shape: tuple[int, int],
+        rng: np.random.Generator,
+        *,
+        rationality: float = DEFAULT_RATIONALITY,
+        spread: float = 0.35,
+        preference: float = 0.2,
+        **arguments: Any,
+    ) -> BoltzmannWalker:
+        """A random person.
+
+        Args:
+            shape: Of the kitchens the person has preferences in.
+            rng: Source of randomness.
+            rationality: Of the median person.
+            spread: Standard deviation of log rationality between people. :func:`rationality_spread` finds .13, .22,
+                .40 and .25 in the four recorded kitchens.
+            preference: Standard deviation of the log cost of each cell; 0 for people without preferences.
+            **arguments: See :class:`Walker`.
+        """
+        own = check_finite("rationality", rationality, 0.0) * math.exp(
+            check_finite("spread", spread, 0.0) * rng.normal()
+        )
+        return cls(own, preferences=draw_preferences(shape, rng, preference), **arguments)
+
+
+class PlannerWalker(Walker):
+    """A person who plans a few steps ahead, dislikes turning, and avoids where it was just before.
+
+    At each step all ways of ``depth`` steps are compared (shorter ones that end in the goal, too) by the cost of their
+    cells, ``turn_cost`` for every change of direction, ``recency`` times the memory of every cell on them, and the
+    beeline (Manhattan distance) from their end to the goal: what lies behind the next corner is not known. The first
+    step of a best way is taken, ties broken at random; with probability ``slip`` any step. The memory of a cell grows
+    by 1 with each visit and fades by ``fade`` with each step. In a kitchen with dead ends such people walk into them.
+
+    Args:
+        depth: Steps looked ahead, 1 to 6.
+        turn_cost: Cost of a change of direction.
+        recency: Cost of a cell that was just visited.
+        fade: What is left of a memory after a step, in [0, 1).
+        slip: Probability of a random step, in [0, 1]. With 0, people may circle for ever in kitchens with dead ends.
+        preferences: See :class:`Walker`.
+        idle: See :class:`Walker`.
+        turn: See :class:`Walker`.
+        tick: See :class:`Walker`.
+    """
+
+    kind = PLANNER
+
+    def __init__(
+        self,
+        depth: int = 3,
+        turn_cost: float = 0.5,
+        recency: float = 1.0,
+        fade: float = 0.8,
+        slip: float = 0.08,
+        **arguments: Any,
+    ) -> None:
+        super().__init__(**arguments)
+        if isinstance(depth, bool) or not isinstance(depth, int | np.integer) or not 1 <= depth <= 6:
+            raise ValueError(f"depth must be an integer from 1 to 6, got {depth!r}")
+        self.depth = int(depth)
+        self.turn_cost = check_finite("turn_cost", turn_cost, minimum=0.0)
+        self.recency = check_finite("recency", recency, minimum=0.0)
+        self.fade = check_finite("fade", fade, minimum=0.0)
+        self.slip = check_finite("slip", slip, minimum=0.0)
+        if self.fade >= 1 or self.slip > 1:
+            raise ValueError(f"fade must be in [0, 1) and slip in [0, 1], got {fade!r} and {slip!r}")
+
+    @property
+    def numbers(self) -> Floats:
+        """``[depth, turn_cost, recency, fade, slip]``."""
+        return np.array([self.depth, self.turn_cost, self.recency, self.fade, self.slip])
+
+    def _parameters(self) -> tuple[str, ...]:
+        return ("depth", "turn_cost", "recency", "fade", "slip", *super()._parameters())
+
+    @classmethod
+    def draw(
+        cls, shape: tuple[int, int], rng: np.random.Generator, *, preference: float = 0.2, **arguments: Any
+    ) -> PlannerWalker:
+        """A random person: looks 2 to 4 steps ahead, dislikes turns more or less, slips in 2 to 15 % of steps.
+
+        Args:
+            shape: Of the kitchens the person has preferences in.
+            rng: Source of randomness.
+            preference: Standard deviation of the log cost of each cell.
+            **arguments: What not to draw; see the class.
+        """
+        drawn = {
+            "depth": int(rng.integers(2, 5)),
+            "turn_cost": float(0.5 * np.exp(0.5 * rng.normal())),
+            "slip": float(rng.uniform(0.02, 0.15)),
+        }
+        return cls(preferences=draw_preferences(shape, rng, preference), **{**drawn, **arguments})
+
+
+WalkerName = Literal["boltzmann", "planner"]
+_WALKERS: Final[dict[str, Any]] = {"boltzmann": BoltzmannWalker.draw, "planner": PlannerWalker.draw}
+
+
+def simulate_participants(
+    layout: OvercookedLayout,
+    n: int,
+    rng: np.random.Generator,
+    *,
+    walker: WalkerName | Callable[..., Walker] = "boltzmann",
+    task: TaskGraph | None = None,
+    executions: int = 1,
+    participant: str = "person",
+    condition: str = "simulated",
+    layout_name: str = "",
+    **settings: Any,
+) -> list[Trajectory]:
+    """The reaches of people who each do a whole task, in a uniformly random valid sequence.
+
+    Where the task is at a stage (start, valid goals), the person walks from the cell it stands on to the goal of the
+    sequence: that is a trajectory, with the valid goals as candidates (candidate set ``task``). The legs that follow,
+    such as back to the pot, are walked and take their time, but give nothing to predict and no trajectory; cooking is
+    not waited for. Where a type of station repeats, each one in reach is a goal, equally likely; other stops are the
+    nearest of their type.
+
+    Args:
+        layout: The kitchen.
+        n: Number of people.
+        rng: Source of all randomness.
+        walker: ``"boltzmann"`` or ``"planner"`` people, drawn anew for each participant, or what draws one, called with
+            (shape, rng).
+        task: The task over station types; the paper's three soups if None.
+        executions: How often each person does the task.
+        participant: Names are ``"{participant}/0"``, ``"{participant}/1"``, ….
+        condition: Of all trajectories.
+        layout_name: Of all trajectories.
+        **settings: Of the people: see :meth:`BoltzmannWalker.draw` and :meth:`PlannerWalker.draw`.
+
+    Raises:
+        LayoutError: The task cannot be done in this kitchen.
+        ValueError: Unknown walkers.
+    """
+    task = task or soup_task()
+    if isinstance(walker, str) and walker not in _WALKERS:
+        raise ValueError(f"walker must be one of {list(get_args(WalkerName))} or a callable, got {walker!r}")
+    draw = _WALKERS[walker] if isinstance(walker, str) else walker
+    found: list[Trajectory] = []
+    for number in range(n):
+        person = draw(layout.shape, rng, **settings)
+        labels = {"participant": f"{participant}/{number}", "condition": condition, "layout_name": layout_name}
+        clock = 0
+        for _ in range(executions):
+            walks, clock = _execute(layout, task, person, clock, rng, labels)
+            found += walks
+    return found
+
+
+def _execute(
+    layout: OvercookedLayout, task: TaskGraph, person: Walker, clock: int, rng: np.random.Generator, labels: Any
+) -> tuple[list[Trajectory], int]:
+    """One task execution: its trajectories, and the tick at its end."""
+    places = layout.named(task.start)
+    if not places:
+        raise LayoutError(f"the task needs a {task.start} station; this kitchen has none", rule="station")
+    place = places[int(rng.integers(len(places)))]
+    cell = draw_one(layout.access(place), place, rng)
+    found = []
+    for step in task.sample(rng):
+        candidates = tuple(name for kind in step.goals for name in in_reach(layout, cell, kind))
+        goals = [name for name in candidates if name.partition("@")[0] == step.goal]
+        goal = goals[int(rng.integers(len(goals)))]
+        states, ticks = person.leg(layout, cell, place, goal, rng)
+        found.append(
+            Trajectory(
+                states=states,
+                times=person.seconds(clock + ticks),
+                start=place,
+                goal=goal,
+                candidates=candidates,
+                layout=layout,
+                candidate_set="task",
+                **labels,
+            )
+        )
+        clock += int(ticks[-1])
+        place, cell = goal, (int(states[-2][0]), int(states[-2][1]))
+        for kind in step.then:
+            stop = in_reach(layout, cell, kind)[0]
+            states, ticks = person.leg(layout, cell, place, stop, rng)
+            clock += int(ticks[-1])
+            place, cell = stop, (int(states[-2][0]), int(states[-2][1]))
+    return found, clock

@@ -1,0 +1,237 @@
+"""People who walk in kitchens: what every simulated walker can do, whatever decides its steps."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, ClassVar, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from legible_envs.errors import LayoutError
+from legible_envs.overcooked.humans.fitting import make_way
+from legible_envs.overcooked.humans.kernels import Way, beside, sample_times, sample_walk
+from legible_envs.overcooked.layout import Cell, OvercookedLayout
+from legible_envs.rollouts.trajectory import Trajectory
+from legible_envs.support.validation import check_finite
+
+if TYPE_CHECKING:
+    from legible_envs.overcooked.policies import WalkingPlayer
+
+__all__ = ["Walker", "draw_one", "draw_preferences", "in_reach"]
+
+Floats = npt.NDArray[np.float64]
+
+LONGEST: Final = 100_000
+"""Steps after which a walk counts as lost: the walker cannot find the goal."""
+
+
+class Walker(ABC):
+    """A person who walks in kitchens.
+
+    Args:
+        preferences: ``(H, W)`` cost of stepping on each cell (> 0), for kitchens of that shape; None means 1 each.
+        idle: Probability of each tick to be spent standing; about half in recorded play.
+        turn: Probability of each tick to be spent turning to something that cannot be walked on.
+        tick: Seconds per tick.
+
+    Raises:
+        ValueError: An argument is out of range.
+    """
+
+    kind: ClassVar[int]
+
+    def __init__(
+        self,
+        *,
+        preferences: npt.ArrayLike | None = None,
+        idle: float = 0.5,
+        turn: float = 0.05,
+        tick: float = 0.15,
+    ) -> None:
+        self.idle = check_finite("idle", idle, minimum=0.0)
+        self.turn = check_finite("turn", turn, minimum=0.0)
+        self.tick = check_finite("tick", tick, minimum=0.0)
+        if self.idle + self.turn >= 1:
+            raise ValueError(f"idle + turn must be less than 1, got {idle!r} + {turn!r}: nobody would ever move")
+        self.preferences = None if preferences is None else np.array(preferences, dtype=np.float64)
+        if self.preferences is not None and not ((self.preferences > 0) & (self.preferences < np.inf)).all():
+            raise ValueError("preferences are costs of stepping on cells: they must be finite and greater than 0")
+        self._ways = lru_cache(maxsize=256)(self._find_way)
+
+    @property
+    @abstractmethod
+    def numbers(self) -> Floats:
+        """What the kernels need to know of this person; see :mod:`legible_envs.overcooked.humans.kernels`."""
+
+    def costs(self, shape: tuple[int, int]) -> Floats:
+        """``(H, W)`` cost of stepping on each cell.
+
+        Raises:
+            ValueError: The preferences are for kitchens of another shape.
+        """
+        if self.preferences is None:
+            return np.ones(shape)
+        if self.preferences.shape != shape:
+            raise ValueError(f"this person has preferences for cells of {self.preferences.shape}, not of {shape}")
+        return self.preferences
+
+    def walk(self, layout: OvercookedLayout, start: str | Cell, goal: str, rng: np.random.Generator) -> list[Cell]:
+        """The cells of one walk: floor cells, then the goal's own.
+
+        Args:
+            layout: The kitchen.
+            start: A floor cell, or a station: the person then leaves from one of its access cells.
+            goal: Name of the goal station.
+            rng: Source of randomness.
+
+        Raises:
+            LayoutError: No such station, a start that is no floor cell, or no way.
+            RuntimeError: The person did not find the goal in 100,000 steps.
+        """
+        cell = self._start_cell(layout, start, goal, rng)
+        path = self._walk(self._way(layout, goal), cell, rng)
+        return [divmod(int(index), layout.shape[1]) for index in path]
+
+    def sample(
+        self,
+        layout: OvercookedLayout,
+        start: str,
+        goals: str | Sequence[str],
+        n: int,
+        rng: np.random.Generator,
+        *,
+        candidates: Sequence[str] | None = None,
+        **labels: Any,
+    ) -> list[Trajectory]:
+        """Walks from a station to goals.
+
+        Args:
+            layout: The kitchen.
+            start: Name of the station left; each walk begins at one of its access cells.
+            goals: The goal, or goals of which each walk draws one.
+            n: How many walks.
+            rng: Source of randomness.
+            candidates: What an observer takes for possible; the goals if None.
+            **labels: Further attributes of :class:`~legible_envs.rollouts.Trajectory`, such as ``participant``.
+
+        Raises:
+            LayoutError: See :meth:`walk`.
+        """
+        names = (goals,) if isinstance(goals, str) else tuple(goals)
+        labels = {"condition": "simulated", **labels}
+        found = []
+        for _ in range(n):
+            goal = names[int(rng.integers(len(names)))]
+            cell = self._start_cell(layout, start, goal, rng)
+            states, ticks = self.leg(layout, cell, start, goal, rng)
+            found.append(
+                Trajectory(
+                    states=states,
+                    times=self.seconds(ticks),
+                    start=start,
+                    goal=goal,
+                    candidates=tuple(candidates or names),
+                    layout=layout,
+                    **labels,
+                )
+            )
+        return found
+
+    def policy(self, env: Any, rng: np.random.Generator) -> WalkingPlayer:
+        """This person as a policy for ``LegibleOvercooked-v0``, one game or many: ``policy(obs, info) -> action``."""
+        from legible_envs.overcooked.policies import WalkingPlayer
+
+        return WalkingPlayer(env, self, rng)
+
+    def seconds(self, ticks: npt.NDArray[np.int64]) -> Floats:
+        """When ticks end."""
+        return np.asarray(ticks * self.tick, dtype=np.float64)
+
+    def _way(self, layout: OvercookedLayout, goal: str) -> Way:
+        if goal not in layout.stations:
+            raise LayoutError(f"no station {goal!r}; this kitchen has {list(layout.stations)}", rule="station")
+        way: Way = self._ways(layout, goal)
+        return way
+
+    def _start_cell(self, layout: OvercookedLayout, start: str | Cell, goal: str, rng: np.random.Generator) -> Cell:
+        """The cell of a start, from which the goal can be reached; one of several at random."""
+        cells = layout.access(start) if isinstance(start, str) else ((int(start[0]), int(start[1])),)
+        if not isinstance(start, str) and not layout.is_floor(cells[0]):
+            raise LayoutError(f"row {start[0]}, column {start[1]} is no floor cell", rule="start", cell=cells[0])
+        way = self._way(layout, goal)
+        near = [cell for cell in cells if way.best[cell[0] * way.width + cell[1]] < np.inf]
+        return draw_one(near, f"no way to {goal!r} from {start!r}", rng)
+
+    def _find_way(self, layout: OvercookedLayout, goal: str) -> Way:
+        return make_way(layout, layout.stations[goal], self.costs(layout.shape))
+
+    def _walk(self, way: Way, cell: Cell, rng: np.random.Generator) -> npt.NDArray[np.int64]:
+        start = cell[0] * way.width + cell[1]
+        path = np.empty(LONGEST, dtype=np.int64)
+        length = sample_walk(self.kind, self.numbers, start, way, rng, path)
+        if length == 0:
+            raise RuntimeError(f"{self!r} did not find the goal within {LONGEST:,} steps")
+        return path[:length].copy()
+
+    def leg(
+        self, layout: OvercookedLayout, cell: Cell, start: str, goal: str, rng: np.random.Generator
+    ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+        """``(T, 2)`` cells from a floor cell into a station, and ``(T,)`` ticks, from a person who faces ``start``."""
+        way = self._way(layout, goal)
+        path = self._walk(way, cell, rng)
+        row, col = layout.stations[start]
+        around = [beside(int(path[0]), direction, way.height, way.width) for direction in range(4)]
+        facing = around.index(row * way.width + col)
+        ticks = np.empty(len(path), dtype=np.int64)
+        sample_times(path, facing, way, self.idle, self.turn, rng, ticks)
+        return np.column_stack(np.divmod(path, way.width)), ticks
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return _rebuild, (type(self), {key: getattr(self, key) for key in self._parameters()})
+
+    def _parameters(self) -> tuple[str, ...]:
+        return ("preferences", "idle", "turn", "tick")
+
+    def __repr__(self) -> str:
+        shown = [f"{key}={getattr(self, key):g}" for key in self._parameters() if key != "preferences"]
+        return f"{type(self).__name__}({', '.join(shown)})"
+
+
+def draw_one(cells: Sequence[Cell], what: str, rng: np.random.Generator) -> Cell:
+    """One of the cells, each equally likely; a :class:`LayoutError` about ``what`` where there is none."""
+    if not cells:
+        raise LayoutError(f"{what}: nobody can walk there", rule="reachable")
+    return cells[int(rng.integers(len(cells)))]
+
+
+@lru_cache(maxsize=512)
+def _shortest_way(layout: OvercookedLayout, name: str) -> Way:
+    """The way of a person without preferences, who counts steps."""
+    return make_way(layout, layout.stations[name])
+
+
+def in_reach(layout: OvercookedLayout, cell: Cell, kind: str) -> list[str]:
+    """Stations of one type that can be walked to, the nearest first."""
+    at = cell[0] * layout.shape[1] + cell[1]
+    steps = {name: float(_shortest_way(layout, name).best[at]) for name in layout.named(kind)}
+    found = sorted((name for name in steps if steps[name] < np.inf), key=lambda name: steps[name])
+    if not found:
+        raise LayoutError(
+            f"no {kind} station can be reached from row {cell[0]}, column {cell[1]}; the task needs one",
+            rule="reachable",
+            cell=cell,
+        )
+    return found
+
+
+def draw_preferences(shape: tuple[int, int], rng: np.random.Generator, preference: float) -> Floats | None:
+    """``(H, W)`` lognormal costs around 1, None for a person without preferences."""
+    sd = check_finite("preference", preference, minimum=0.0)
+    return None if sd == 0 else np.exp(sd * rng.normal(size=shape))
+
+
+def _rebuild(cls: type[Walker], parameters: dict[str, Any]) -> Walker:
+    return cls(**parameters)

@@ -1,0 +1,293 @@
+"""Where the kitchens of an episode come from: one fixed kitchen, a set, or a seeded, splittable random stream."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from typing import Any, Final, Protocol, runtime_checkable
+
+import numpy as np
+
+from legible_envs.errors import LayoutError
+from legible_envs.overcooked.layout import OvercookedLayout
+
+__all__ = [
+    "DEFAULT_KITCHEN",
+    "LayoutDistribution",
+    "LayoutSet",
+    "RandomLayouts",
+    "default_layout",
+    "read_distribution",
+    "read_layout",
+]
+
+DEFAULT_KITCHEN: Final = """\
+XXTXOXX
+X     X
+C     D
+X  V  X
+F     P
+X  1  X
+XXXSXXX"""
+
+SPLITS: Final = ("all", "train", "test")
+MAX_TRIES: Final = 10_000
+
+
+@runtime_checkable
+class LayoutDistribution(Protocol):
+    """Anything that draws kitchens."""
+
+    def sample(self, rng: np.random.Generator) -> OvercookedLayout:
+        """Draw one kitchen."""
+        ...
+
+
+class RandomLayouts:
+    """Random valid kitchens of one shape, split into disjoint train and test kitchens by their content.
+
+    Whether a kitchen is for training or for testing depends on nothing but the kitchen (a hash of its drawing and
+    ``split_seed``), so the two never share one, whatever the seeds, versions and machines they are drawn with.
+
+    Args:
+        shape: Rows and columns.
+        split: ``"all"``, ``"train"`` or ``"test"``.
+        test_fraction: Share of all kitchens that are test kitchens.
+        split_seed: Another seed is another split.
+        obstacle_rate: Probability of a virtual obstacle on each inner cell, before invalid kitchens are rejected.
+        num_layouts: Draw uniformly out of this many kitchens, made from ``layout_seed``; None means no limit.
+        layout_seed: Seed of the kitchens when ``num_layouts`` is given.
+        workspace: Further arguments of :class:`~legible_envs.overcooked.design.workspace.OvercookedWorkspace`, such as
+            ``{"locked": …, "forbidden": …}``.
+
+    Raises:
+        ValueError: Arguments out of range, or a split so small that no kitchen of it turned up in 10,000 draws.
+
+    Example:
+        >>> train, test = RandomLayouts((7, 7)).split(test_fraction=0.25)
+        >>> train.to_config()["split"], test.test_fraction
+        ('train', 0.25)
+    """
+
+    def __init__(
+        self,
+        shape: Sequence[int] = (7, 7),
+        *,
+        split: str = "all",
+        test_fraction: float = 0.2,
+        split_seed: int = 0,
+        obstacle_rate: float = 0.2,
+        num_layouts: int | None = None,
+        layout_seed: int = 0,
+        workspace: Mapping[str, Any] | None = None,
+    ) -> None:
+        if split not in SPLITS:
+            raise ValueError(f"`split` must be one of {SPLITS}, got {split!r}")
+        if not 0.0 < test_fraction < 1.0:
+            raise ValueError(f"`test_fraction` must lie between 0 and 1, got {test_fraction!r}")
+        if not 0.0 <= obstacle_rate < 1.0:
+            raise ValueError(f"`obstacle_rate` must be at least 0 and below 1, got {obstacle_rate!r}")
+        if num_layouts is not None and num_layouts < 1:
+            raise ValueError(f"`num_layouts` must be None or at least 1, got {num_layouts!r}")
+        self.shape = (int(shape[0]), int(shape[1]))
+        self.split_name = split
+        self.test_fraction = float(test_fraction)
+        self.split_seed = int(split_seed)
+        self.obstacle_rate = float(obstacle_rate)
+        self.num_layouts = num_layouts
+        self.layout_seed = int(layout_seed)
+        self.workspace = dict(workspace or {})
+        self._workspace: Any = None
+        self._layouts: tuple[OvercookedLayout, ...] | None = None
+
+    def sample(self, rng: np.random.Generator) -> OvercookedLayout:
+        """Draw one kitchen; all randomness comes from ``rng``."""
+        if self.num_layouts is None:
+            return self._draw(rng)
+        if self._layouts is None:
+            own = np.random.default_rng(self.layout_seed)
+            self._layouts = tuple(self._draw(own) for _ in range(self.num_layouts))
+        return self._layouts[int(rng.integers(len(self._layouts)))]
+
+    def _draw(self, rng: np.random.Generator) -> OvercookedLayout:
+        if self._workspace is None:
+            from legible_envs.overcooked.design.workspace import OvercookedWorkspace
+
+            self._workspace = OvercookedWorkspace(shape=self.shape, **self.workspace)
+        for _ in range(MAX_TRIES):
+            genome = self._workspace.sample(1, rng, obstacle_rate=self.obstacle_rate)[0]
+            layout: OvercookedLayout = self._workspace.decode(genome)
+            if self.split_name == "all" or self.is_test(layout) == (self.split_name == "test"):
+                return layout
+        raise ValueError(f"no {self.split_name} kitchen in {MAX_TRIES:,} draws; test_fraction={self.test_fraction}")
+
+    def is_test(self, layout: OvercookedLayout) -> bool:
+        """Whether a kitchen is one of the test kitchens."""
+        import hashlib
+
+        digest = hashlib.sha256(f"{self.split_seed}:{layout.to_ascii()}".encode()).digest()
+        return int.from_bytes(digest[:8], "big") < self.test_fraction * 2**64
+
+    def split(self, test_fraction: float | None = None) -> tuple[RandomLayouts, RandomLayouts]:
+        """The train and the test part of this distribution."""
+        config = self.to_config()
+        del config["kind"]
+        if test_fraction is not None:
+            config["test_fraction"] = test_fraction
+        return RandomLayouts(**{**config, "split": "train"}), RandomLayouts(**{**config, "split": "test"})
+
+    def to_config(self) -> dict[str, Any]:
+        """Plain data that :func:`read_distribution` reads back."""
+        return {
+            "kind": "random",
+            "shape": list(self.shape),
+            "split": self.split_name,
+            "test_fraction": self.test_fraction,
+            "split_seed": self.split_seed,
+            "obstacle_rate": self.obstacle_rate,
+            "num_layouts": self.num_layouts,
+            "layout_seed": self.layout_seed,
+            "workspace": dict(self.workspace),
+        }
+
+    def __repr__(self) -> str:
+        arguments = ", ".join(f"{key}={value!r}" for key, value in self.to_config().items() if key != "kind")
+        return f"RandomLayouts({arguments})"
+
+
+class LayoutSet:
+    """Uniform over given kitchens.
+
+    Args:
+        layouts: Kitchens, or anything that :func:`~legible_envs.overcooked.layouts.read_layout` understands.
+        shape: Rows and columns they must have.
+
+    Raises:
+        LayoutError: No kitchen, or one that is not one of this shape.
+    """
+
+    def __init__(self, layouts: Sequence[Any], shape: Sequence[int]) -> None:
+        from legible_envs.overcooked.layouts import read_layout
+
+        self.shape = (int(shape[0]), int(shape[1]))
+        self.layouts = tuple(read_layout(layout, self.shape) for layout in layouts)
+        if not self.layouts:
+            raise LayoutError("a set of layouts needs at least one", rule="type")
+
+    def sample(self, rng: np.random.Generator) -> OvercookedLayout:
+        """Draw one kitchen; all randomness comes from ``rng``."""
+        return self.layouts[int(rng.integers(len(self.layouts)))]
+
+    def to_config(self) -> list[str]:
+        """Plain data that :func:`read_distribution` reads back."""
+        return [layout.to_ascii() for layout in self.layouts]
+
+
+def read_distribution(value: Any, shape: tuple[int, int]) -> LayoutDistribution:
+    """Turn whatever describes a distribution of kitchens into one of the given shape.
+
+    Args:
+        value: ``"random"``, ``"random:train"``, ``"random:test"``; a mapping with ``"kind": "random"`` and arguments of
+            :class:`RandomLayouts`; a list of kitchens; or an object with a method ``sample(rng)``.
+        shape: Rows and columns of the kitchens.
+
+    Raises:
+        ValueError: Not a distribution, or one of another shape.
+        LayoutError: A kitchen in a list is bad.
+    """
+    if isinstance(value, str):
+        kind, _, split = value.partition(":")
+        if kind == "random" and (not split or split in SPLITS):
+            return RandomLayouts(shape, split=split or "all")
+    elif isinstance(value, Mapping):
+        arguments = {"shape": shape, **value}
+        if arguments.pop("kind", None) == "random":
+            if tuple(arguments["shape"]) != shape:
+                raise ValueError(f"`layouts` is of shape {tuple(arguments['shape'])}, the environment of shape {shape}")
+            return RandomLayouts(**arguments)
+    elif isinstance(value, LayoutDistribution):
+        if tuple(getattr(value, "shape", shape)) != shape:
+            raise ValueError(f"`layouts` draws kitchens of shape {value.shape}, the environment needs {shape}")  # type: ignore[attr-defined]
+        return value
+    elif isinstance(value, Sequence):
+        return LayoutSet(value, shape)
+    raise ValueError(
+        "`layouts` must be 'random', 'random:train', 'random:test', a mapping with kind='random', a list of "
+        f"kitchens or an object with sample(rng), got {value!r}"
+    )
+
+
+@lru_cache(maxsize=64)
+def default_layout(shape: tuple[int, int]) -> OvercookedLayout:
+    """The kitchen of an environment that was given none: always the same one for a shape.
+
+    Raises:
+        LayoutError: The shape is too small for the stations.
+    """
+    if shape == (7, 7):
+        return OvercookedLayout.from_ascii(DEFAULT_KITCHEN)
+    return RandomLayouts(shape, obstacle_rate=0.1).sample(np.random.default_rng(0))
+
+
+def read_layout(value: Any, shape: tuple[int, int]) -> OvercookedLayout:
+    """Turn whatever describes a kitchen into one of the given shape.
+
+    Args:
+        value: An :class:`OvercookedLayout`, an ASCII drawing, a list of row strings, nested lists of symbols, a 2-D
+            array of cell codes, or a genome (1-D integers) of ``OvercookedWorkspace(shape)``.
+        shape: Rows and columns it must have.
+
+    Raises:
+        LayoutError: Not a layout, of another shape, or a genome that is invalid; names the cell where there is one.
+    """
+    if isinstance(value, OvercookedLayout):
+        layout = value
+    elif isinstance(value, str):
+        layout = OvercookedLayout.from_ascii(value)
+    elif isinstance(value, Sequence) and value and all(isinstance(row, str) for row in value):
+        layout = OvercookedLayout.from_rows(value)
+    elif isinstance(value, Sequence | np.ndarray) and len(value):
+        layout = _read_array(value, shape)
+    else:
+        raise LayoutError(
+            "expected an OvercookedLayout, an ASCII drawing, a nested list of symbols or a genome, "
+            f"got {type(value).__name__}",
+            rule="type",
+        )
+    if layout.shape != shape:
+        raise LayoutError(
+            f"this environment was made for kitchens of shape {shape}, got one of shape {layout.shape}; "
+            "make another with `shape=`",
+            rule="shape",
+        )
+    return layout
+
+
+def _read_array(value: Any, shape: tuple[int, int]) -> OvercookedLayout:
+    first = value[0]
+    if isinstance(first, Sequence) and first and isinstance(first[0], str):
+        try:
+            return OvercookedLayout.from_rows(value)
+        except TypeError as error:
+            raise LayoutError(f"nested lists must hold rows of one-character symbols: {error}", rule="type") from error
+    try:
+        array = np.asarray(value)
+    except ValueError as error:
+        raise LayoutError(f"ragged nested list: {error}", rule="ragged") from error
+    if array.dtype.kind == "U" and array.ndim == 2:
+        return OvercookedLayout.from_rows(array.tolist())
+    if array.dtype.kind not in "iu" or array.ndim not in (1, 2):
+        raise LayoutError(
+            f"expected a genome (1-D integers) or cells (2-D integers or symbols), got {array.ndim}-D {array.dtype}",
+            rule="type",
+        )
+    if array.ndim == 2:
+        return OvercookedLayout(array)
+    from legible_envs.overcooked.design.workspace import OvercookedWorkspace
+
+    try:
+        return OvercookedWorkspace(shape=shape).decode(array)
+    except LayoutError:
+        raise
+    except ValueError as error:
+        raise LayoutError(f"not a genome of kitchens of shape {shape}: {error}", rule="genome") from error

@@ -1,0 +1,1 @@
+"""The legibility score of kitchens: kernels, their tables, and explanations of a score."""

@@ -1,0 +1,228 @@
+"""Kernels of the exact legibility score of kitchens whose stations each have one access cell.
+
+What is computed is defined in :mod:`legible_envs.legibility`; here it is arranged to be fast. Grids are flat arrays
+with their counter border, so that a neighbour is an offset. One flood per station gives distances and the number of
+shortest paths to every cell. A cell on a shortest path then knows the *slack* of every goal (how much longer the way
+through the cell is than the best), and one sum over the subsets of goals that are not tied serves all stages at once.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from legible_envs.support.compiled import kernel
+
+__all__ = ["ScoreTables", "flood", "make_scratch", "score_cells"]
+
+FREE = -1
+BLOCKED = -2
+
+
+class ScoreTables(NamedTuple):
+    """What the score needs to know of task and parameters; ``S`` starts, ``K`` goals, ``N`` stations.
+
+    Attributes:
+        starts: ``[S]`` station index of each place where a person may stand when choosing the next goal.
+        goals: ``[K]`` station index of each goal.
+        stage_weights: ``[S, 2**K]`` expected visits of the stage (start, set of valid goals).
+        tie_penalties: ``[S, K, 2**K]`` by start, true goal and set of tied goals: expected visits of the stages in
+            which the tie leaves the goal in doubt, times the probability to guess wrong.
+        discounts: ``[D]`` ``exp(-beta * slack)`` for whole numbers of steps.
+        prefix_weights: ``[L, L]`` weight of the prefix of ``t`` steps of a walk of ``l`` steps, at ``[l, t]``.
+        legs: ``[N, N]`` expected number of walks from station to station in one task execution.
+        c: Cost per step observed in doubt.
+        beta: Rationality per unit of cost.
+        tie_tolerance: Slacks up to this count as ties.
+    """
+
+    starts: npt.NDArray[np.int64]
+    goals: npt.NDArray[np.int64]
+    stage_weights: npt.NDArray[np.float64]
+    tie_penalties: npt.NDArray[np.float64]
+    discounts: npt.NDArray[np.float64]
+    prefix_weights: npt.NDArray[np.float64]
+    legs: npt.NDArray[np.float64]
+    c: float
+    beta: float
+    tie_tolerance: float
+
+
+@kernel
+def flood(
+    floor: npt.NDArray[np.int32],
+    stride: int,
+    source: int,
+    distance: npt.NDArray[np.int32],
+    paths: npt.NDArray[np.float64],
+    queue: npt.NDArray[np.int64],
+) -> int:
+    """Breadth-first distances and numbers of shortest paths from one floor cell.
+
+    Args:
+        floor: ``[n]`` -1 where a person can stand, -2 elsewhere; the border is -2.
+        stride: Columns of the grid.
+        source: Index of a floor cell.
+        distance: ``[n]`` output: moves from the source, -1 where unreachable, -2 where blocked.
+        paths: ``[n]`` output: number of shortest paths.
+        queue: ``[n]`` output: the cells reached, nearest first.
+
+    Returns:
+        Number of cells reached.
+    """
+    distance[:] = floor
+    paths[:] = 0.0
+    distance[source] = 0
+    paths[source] = 1.0
+    queue[0] = source
+    head, tail = 0, 1
+    while head < tail:
+        cell = queue[head]
+        head += 1
+        following = distance[cell] + 1
+        ways = paths[cell]
+        for offset in (-stride, stride, 1, -1):
+            after = cell + offset
+            if distance[after] == FREE:
+                distance[after] = following
+                paths[after] = ways
+                queue[tail] = after
+                tail += 1
+            elif distance[after] == following:
+                paths[after] += ways
+    return tail
+
+
+@kernel
+def clean_margins(
+    discounts: npt.NDArray[np.float64],
+    free: npt.NDArray[np.int64],
+    num_free: int,
+    masks: npt.NDArray[np.int64],
+    sums: npt.NDArray[np.float64],
+    highest: npt.NDArray[np.float64],
+    margins: npt.NDArray[np.float64],
+) -> int:
+    """Margin ``p(1) - p(2)`` of a goal that leads alone, against every subset of the goals that do not tie.
+
+    Args:
+        discounts: ``[K]`` relative posterior ``exp(-beta * slack)`` of each goal.
+        free: ``[K]`` the goals that do not tie, in the first ``num_free`` places.
+        num_free: How many they are.
+        masks: ``[2**K]`` output: the subsets as bit masks over all goals.
+        sums: ``[2**K]`` scratch.
+        highest: ``[2**K]`` scratch.
+        margins: ``[2**K]`` output.
+
+    Returns:
+        Number of subsets, ``2**num_free``.
+    """
+    masks[0] = 0
+    sums[0] = 1.0
+    highest[0] = 0.0
+    margins[0] = 1.0
+    count = 1
+    for j in range(num_free):
+        goal = free[j]
+        value = discounts[goal]
+        bit = 1 << goal
+        for u in range(count):
+            masks[count + u] = masks[u] | bit
+            sums[count + u] = sums[u] + value
+            highest[count + u] = max(highest[u], value)
+        for u in range(count, 2 * count):
+            margins[u] = (1.0 - highest[u]) / sums[u]
+        count *= 2
+    return count
+
+
+@kernel
+def make_scratch(num_cells: int, num_stations: int, num_goals: int) -> Any:
+    """Working memory of :func:`score_cells`, allocated once per batch."""
+    subsets = 1 << num_goals
+    return (
+        np.empty((num_stations, num_cells), dtype=np.int32),
+        np.empty((num_stations, num_cells), dtype=np.float64),
+        np.empty(num_cells, dtype=np.int64),
+        np.empty(num_goals, dtype=np.int64),
+        np.empty(num_goals, dtype=np.float64),
+        np.empty(num_goals, dtype=np.float64),
+        np.empty(num_goals, dtype=np.int64),
+        np.empty(subsets, dtype=np.int64),
+        np.empty(subsets, dtype=np.float64),
+        np.empty(subsets, dtype=np.float64),
+        np.empty(subsets, dtype=np.float64),
+    )
+
+
+@kernel
+def score_cells(
+    floor: npt.NDArray[np.int32],
+    stride: int,
+    access: npt.NDArray[np.int64],
+    tables: ScoreTables,
+    scratch: Any,
+) -> tuple[float, float]:
+    """Legibility per task execution (Eq. 3) and expected floor moves of one kitchen.
+
+    Args:
+        floor: ``[n]`` -1 where a person can stand, -2 elsewhere.
+        stride: Columns of the grid.
+        access: ``[N]`` index of the floor cell from which each station is used.
+        tables: Task and parameters.
+        scratch: See :func:`make_scratch`.
+
+    Returns:
+        ``(legibility, distance)``; both NaN where two stations are not connected.
+    """
+    distance, paths, queue, slack, discounts, shares, free, masks, sums, highest, margins = scratch
+    moves = 0.0
+    reached = 0
+    for a in range(len(access)):
+        reached = flood(floor, stride, access[a], distance[a], paths[a], queue)
+        for b in range(len(access)):
+            if distance[a, access[b]] < 0:
+                return np.nan, np.nan
+            moves += tables.legs[a, b] * distance[a, access[b]]
+
+    num_goals = len(tables.goals)
+    total = 0.0
+    for s in range(len(tables.starts)):
+        start = tables.starts[s]
+        weights = tables.stage_weights[s]
+        # All stations are connected, so any flood's queue holds the cells that every flood reaches.
+        for cell in queue[:reached]:
+            here = distance[start, cell]
+            tied, num_free, on_path = 0, 0, 0
+            for g in range(num_goals):
+                station = tables.goals[g]
+                slack[g] = here + distance[station, cell] - distance[start, access[station]]
+                if slack[g] <= tables.tie_tolerance:
+                    tied |= 1 << g
+                else:
+                    discounts[g] = tables.discounts[slack[g]]
+                    free[num_free] = g
+                    num_free += 1
+                if slack[g] == 0:
+                    on_path |= 1 << g
+            if on_path == 0:
+                continue
+            step = here + 1
+            doubt = 0.0
+            for g in range(num_goals):
+                if on_path & (1 << g):
+                    station = tables.goals[g]
+                    goal_cell = access[station]
+                    share = paths[start, cell] * paths[station, cell] / paths[start, goal_cell]
+                    shares[g] = share * tables.prefix_weights[distance[start, goal_cell] + 2, step]
+                    doubt += shares[g] * tables.tie_penalties[s, g, tied]
+            total -= tables.c * step * doubt
+            for u in range(clean_margins(discounts, free, num_free, masks, sums, highest, margins)):
+                visits = 0.0
+                for g in range(num_goals):
+                    if on_path & (1 << g):
+                        visits += shares[g] * weights[masks[u] | (1 << g)]
+                total += margins[u] * visits
+    return total, moves

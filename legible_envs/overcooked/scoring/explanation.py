@@ -1,0 +1,319 @@
+"""The score of any one kitchen, explained: recorded ones, Overcooked-AI's, and those no genome can express.
+
+These functions follow the readable definition, so stations may repeat, stand inside and have several access cells.
+Where a type repeats, each of its stations is a goal, the person leaves from each of them equally often, and walks that
+follow a goal (to the pot, to serving) go to the nearest.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+import numpy.typing as npt
+
+from legible_envs.errors import LayoutError
+from legible_envs.legibility import From, Node, PrefixScore, PrefixSpec, Ties, check_prefix, goal_legibility
+from legible_envs.overcooked.layout import FLOOR, OvercookedLayout
+from legible_envs.overcooked.recipes import soup_task
+from legible_envs.overcooked.scoring.boltzmann import (
+    BoltzmannWalks,
+    HumanModel,
+    boltzmann_legibility,
+    boltzmann_walks,
+    check_human,
+)
+from legible_envs.tasks import TaskGraph
+
+__all__ = ["ambiguity", "explain_layout", "grid_graph", "layout_distance", "score_layout"]
+
+_NEIGHBOURS = ((-1, 0), (1, 0), (0, 1), (0, -1))
+
+
+def grid_graph(
+    layout: OvercookedLayout, cell_costs: npt.NDArray[np.float64] | None = None
+) -> dict[Node, dict[Node, float]]:
+    """The kitchen as a graph for :mod:`legible_envs.legibility`.
+
+    Nodes are floor cells ``(row, col)``, every station by name as somewhere to arrive, and ``From(name)`` as somewhere
+    to leave. Stepping on a cell costs what ``cell_costs`` says (1 by default), arriving at a station 1.
+    """
+
+    def cost(cell: tuple[int, int]) -> float:
+        return 1.0 if cell_costs is None else float(cell_costs[cell])
+
+    graph: dict[Node, dict[Node, float]] = {}
+    for row, col in np.argwhere(layout.cells == 0).tolist():
+        around = [(row + dr, col + dc) for dr, dc in _NEIGHBOURS]
+        graph[row, col] = {cell: cost(cell) for cell in around if layout.is_floor(cell)}
+    for name in layout.stations:
+        graph[name] = {}
+        graph[From(name)] = {cell: cost(cell) for cell in layout.access(name)}
+        for cell in layout.access(name):
+            graph[cell][name] = 1.0
+    return graph
+
+
+class _Reach(NamedTuple):
+    """One reach of the task: where from, among which goals, for which one, how often, and what may be seen of it."""
+
+    start: str
+    goals: tuple[str, ...]
+    goal: str
+    weight: float
+    scores: list[PrefixScore]
+    lost_mass: float = 0.0
+
+
+def _reaches(
+    layout: OvercookedLayout,
+    task: TaskGraph,
+    cell_costs: npt.NDArray[np.float64] | None,
+    human: HumanModel,
+    settings: Mapping[str, Any],
+) -> Iterator[_Reach]:
+    graph = grid_graph(layout, cell_costs)
+    walks: dict[tuple[str, str], BoltzmannWalks] = {}
+    observer = {key: value for key, value in settings.items() if key != "prefix"}
+    for stage in task.stages():
+        starts = _instances(layout, stage.start)
+        goals = tuple(name for kind in stage.goals for name in _instances(layout, kind))
+        for start in starts:
+            for goal in goals:
+                lost_mass = 0.0
+                try:
+                    if human.rationality is None or human.horizon is None:
+                        scores = goal_legibility(graph, From(start), goal, goals, **settings)
+                    else:
+                        if (start, goal) not in walks:
+                            walks[start, goal] = boltzmann_walks(
+                                graph,
+                                From(start),
+                                goal,
+                                rationality=human.rationality,
+                                horizon=human.horizon,
+                                prefix=settings["prefix"],
+                            )
+                        lost_mass = walks[start, goal].lost_mass
+                        scores = boltzmann_legibility(graph, From(start), goals, walks[start, goal], **observer)
+                except ValueError as error:
+                    raise LayoutError(f"the task cannot be done in this kitchen: {error}", rule="reachable") from error
+                yield _Reach(start, goals, goal, stage.weight / len(starts), scores, lost_mass)
+
+
+def _instances(layout: OvercookedLayout, kind: str) -> tuple[str, ...]:
+    names = (kind,) if kind in layout.stations else layout.named(kind)
+    if not names:
+        raise LayoutError(f"the task needs a {kind} station; the kitchen has {list(layout.stations)}", rule="station")
+    return names
+
+
+def _settings(prefix: Any, beta: float, c: float, ties: Ties, tie_tolerance: float) -> dict[str, Any]:
+    return {"prefix": check_prefix(prefix), "beta": beta, "c": c, "ties": ties, "tie_tolerance": tie_tolerance}
+
+
+def _people(layout: OvercookedLayout, human: str, rationality: float | None, horizon: int | None) -> HumanModel:
+    return check_human(human, rationality, horizon, int(np.count_nonzero(layout.cells == FLOOR)))
+
+
+def layout_distance(layout: OvercookedLayout, task: TaskGraph) -> float:
+    """Expected number of floor moves of one task execution in a uniformly random valid sequence.
+
+    Where a type repeats: a goal is any of its stations, equally likely; every other stop is the nearest of its type.
+
+    Raises:
+        LayoutError: A station the task needs is missing or cannot be reached.
+    """
+    goals = set(task.goals)
+    total = []
+    for (a, b), expected in task.legs().items():
+        moves = []
+        for start in _instances(layout, a):
+            field = layout.distances_from(layout.access(start))
+            reached = [
+                min((int(field[cell]) for cell in layout.access(name) if field[cell] >= 0), default=math.inf)
+                for name in _instances(layout, b)
+            ]
+            moves.append(sum(reached) / len(reached) if b in goals else min(reached))
+        leg = sum(moves) / len(moves)
+        if math.isinf(leg):
+            raise LayoutError(f"the task cannot be done in this kitchen: no way from {a} to {b}", rule="reachable")
+        total.append(expected * leg)
+    return math.fsum(total)
+
+
+def score_layout(
+    layout: OvercookedLayout,
+    task: TaskGraph | None = None,
+    *,
+    prefix: PrefixSpec = "mean",
+    beta: float = 1.0,
+    c: float = 1.0,
+    ties: Ties = "expected",
+    tie_tolerance: float = 1e-9,
+    cell_costs: npt.NDArray[np.float64] | None = None,
+    human: str = "shortest",
+    rationality: float | None = None,
+    horizon: int | None = None,
+) -> dict[str, Any]:
+    """Score any kitchen.
+
+    Args:
+        layout: The kitchen.
+        task: The task, over station types; the paper's three soups if None.
+        prefix: Which prefixes count, see :func:`~legible_envs.legibility.prefix_weights`.
+        beta: Rationality per unit of cost.
+        c: Cost per step in doubt.
+        ties: ``"expected"`` or ``"strict"``.
+        tie_tolerance: Costs this close count as equal.
+        cell_costs: ``(H, W)`` cost of stepping on each cell, None for 1.
+        human: How people walk, ``"shortest"`` or ``"boltzmann"``; see :mod:`legible_envs.overcooked.scoring.boltzmann`.
+        rationality: Of ``human="boltzmann"``.
+        horizon: Of ``human="boltzmann"``.
+
+    Returns:
+        ``score`` (Eq. 3 per sequence); ``distance`` (floor moves per execution); ``normalised``, the score over the
+        expected number of (stage, goal) pairs, at most 1 for ``prefix="mean"``; ``single_goal_share``, the part of the
+        score that comes from stages with one valid goal, and ``single_goal_score``; ``num_obstacles``;
+        ``candidate_set`` (``"task"``: valid by precedence); ``num_sequences``; ``num_stages``; ``human``. Where
+        that is ``"boltzmann"`` also ``rationality``, ``horizon``, ``lost_mass`` (probability that a reach of the task
+        does not arrive within the horizon; the score is that of those that do) and ``largest_lost_mass`` of a reach.
+
+    Raises:
+        LayoutError: A station the task needs is missing or cannot be reached.
+    """
+    task = task or soup_task()
+    settings = _settings(prefix, beta, c, ties, tie_tolerance)
+    people = _people(layout, human, rationality, horizon)
+    parts, single, pairs, lost = [], [], [], []
+    for reach in _reaches(layout, task, cell_costs, people, settings):
+        value = reach.weight * math.fsum(s.probability * s.weight * s.value for s in reach.scores)
+        parts.append(value)
+        pairs.append(reach.weight)
+        lost.append(reach.lost_mass)
+        if len(reach.goals) == 1:
+            single.append(value)
+    score = math.fsum(parts)
+    result = {
+        "score": score,
+        "distance": layout_distance(layout, task),
+        "normalised": score / math.fsum(pairs),
+        "single_goal_score": math.fsum(single),
+        "single_goal_share": math.fsum(single) / score if score else math.nan,
+        "num_obstacles": layout.num_obstacles,
+        "candidate_set": "task",
+        "num_sequences": task.num_sequences,
+        "num_stages": len(task.stages()),
+        "layout_id": layout.layout_id,
+        "human": people.name,
+    }
+    if people.name == "boltzmann":
+        result["rationality"], result["horizon"] = people.rationality, people.horizon
+        result["lost_mass"] = math.fsum(w * x for w, x in zip(pairs, lost, strict=True)) / math.fsum(pairs)
+        result["largest_lost_mass"] = max(lost)
+    return result
+
+
+def explain_layout(
+    layout: OvercookedLayout,
+    task: TaskGraph | None = None,
+    *,
+    prefix: PrefixSpec = "mean",
+    beta: float = 1.0,
+    c: float = 1.0,
+    ties: Ties = "expected",
+    tie_tolerance: float = 1e-9,
+    cell_costs: npt.NDArray[np.float64] | None = None,
+    human: str = "shortest",
+    rationality: float | None = None,
+    horizon: int | None = None,
+) -> list[dict[str, Any]]:
+    """Which stages, goals and prefixes win or lose the score; arguments as for :func:`score_layout`.
+
+    Returns:
+        A row for every stage and goal, the greatest loss first: ``start``, ``goals`` (valid), ``goal`` (true),
+        ``weight`` (expected number of such stages), ``score`` (expected legibility of the reach), ``contribution``
+        (weight times score; contributions sum to the layout's score), ``ties_with`` (probability that each other goal
+        is at the top, averaged over the weighted prefixes: together with the true one, or instead of it where people
+        leave the shortest ways), and ``prefixes``: a row for every step ``t`` with the mean ``value`` of Eq. 2, its
+        ``weight`` and ``ties_with`` at that step.
+    """
+    rows = []
+    settings = _settings(prefix, beta, c, ties, tie_tolerance)
+    people = _people(layout, human, rationality, horizon)
+    for start, goals, goal, weight, scores, _ in _reaches(layout, task or soup_task(), cell_costs, people, settings):
+        score = math.fsum(s.probability * s.weight * s.value for s in scores)
+        rows.append(
+            {
+                "start": start,
+                "goals": list(goals),
+                "goal": goal,
+                "weight": weight,
+                "score": score,
+                "contribution": weight * score,
+                "ties_with": _tie_shares(goal, scores),
+                "prefixes": [_prefix_row(goal, t, scores) for t in sorted({s.step for s in scores})],
+            }
+        )
+    return sorted(rows, key=lambda row: row["contribution"])
+
+
+def _tie_shares(goal: str, scores: list[PrefixScore]) -> dict[str, float]:
+    total = math.fsum(s.probability * s.weight for s in scores)
+    shares: dict[str, float] = defaultdict(float)
+    for s in scores:
+        for other in s.tied:
+            if other != goal and total:
+                shares[str(other)] += s.probability * s.weight / total
+    return dict(shares)
+
+
+def _prefix_row(goal: str, step: int, scores: list[PrefixScore]) -> dict[str, Any]:
+    here = [s for s in scores if s.step == step]
+    mass = math.fsum(s.probability for s in here)
+    ties: dict[str, float] = defaultdict(float)
+    for s in here:
+        for other in s.tied:
+            if other != goal:
+                ties[str(other)] += s.probability / mass
+    return {
+        "t": step,
+        "weight": math.fsum(s.probability * s.weight for s in here) / mass,
+        "value": math.fsum(s.probability * s.value for s in here) / mass,
+        "ties_with": dict(ties),
+    }
+
+
+def ambiguity(
+    layout: OvercookedLayout,
+    task: TaskGraph | None = None,
+    *,
+    prefix: PrefixSpec = "mean",
+    beta: float = 1.0,
+    c: float = 1.0,
+    ties: Ties = "expected",
+    tie_tolerance: float = 1e-9,
+    cell_costs: npt.NDArray[np.float64] | None = None,
+    human: str = "shortest",
+    rationality: float | None = None,
+    horizon: int | None = None,
+) -> npt.NDArray[np.float64]:
+    """``(H, W)`` probability that an observer who sees the person on a cell would name a wrong goal; NaN off all walks.
+
+    Averaged over all walks of the task that pass the cell, each as often as it happens; arguments as for
+    :func:`score_layout`.
+    """
+    wrong = np.zeros(layout.shape)
+    visits = np.zeros(layout.shape)
+    settings = _settings(prefix, beta, c, ties, tie_tolerance)
+    people = _people(layout, human, rationality, horizon)
+    for _, goals, goal, weight, scores, _ in _reaches(layout, task or soup_task(), cell_costs, people, settings):
+        for s in scores:
+            cell = cast("tuple[int, int]", s.node)
+            visits[cell] += weight / len(goals) * s.probability
+            wrong[cell] += weight / len(goals) * s.probability * (1 - (goal in s.tied) / len(s.tied))
+    with np.errstate(invalid="ignore"):
+        return np.where(visits > 0, wrong / visits, np.nan)

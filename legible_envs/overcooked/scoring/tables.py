@@ -1,0 +1,92 @@
+"""From a task and parameters to the tables the score kernel reads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from legible_envs.errors import TaskError
+from legible_envs.legibility import PrefixSpec, Ties, prefix_weights
+from legible_envs.overcooked.scoring.exact_kernels import ScoreTables
+from legible_envs.tasks import TaskGraph
+
+__all__ = ["make_tables"]
+
+MAX_GOALS = 12
+
+
+def make_tables(
+    task: TaskGraph,
+    stations: Sequence[str],
+    *,
+    num_floor: int,
+    prefix: PrefixSpec,
+    beta: float,
+    c: float,
+    ties: Ties,
+    tie_tolerance: float,
+) -> ScoreTables:
+    """Build the tables of :class:`~legible_envs.overcooked.scoring.exact_kernels.ScoreTables`.
+
+    Args:
+        task: The task; its places are station types.
+        stations: Station types in genome order.
+        num_floor: Largest possible number of floor cells, which bounds all distances.
+        prefix: Which prefixes count.
+        beta: Rationality per step.
+        c: Cost per step observed in doubt.
+        ties: ``"expected"`` or ``"strict"``.
+        tie_tolerance: Slacks up to this count as ties.
+
+    Raises:
+        TaskError: The task names a place that is no station, or has more than 12 goals.
+    """
+    unknown = [place for place in task.places if place not in stations]
+    if unknown:
+        raise TaskError(f"the task needs {unknown}, which the kitchen lacks; its stations are {list(stations)}")
+    goals = task.goals
+    if len(goals) > MAX_GOALS:
+        raise TaskError(f"at most {MAX_GOALS} different goals are supported, the task has {len(goals)}")
+    stages = task.stages()
+    starts = sorted({stage.start for stage in stages})
+    weights = np.zeros((len(starts), 1 << len(goals)))
+    for stage in stages:
+        weights[starts.index(stage.start), sum(1 << goals.index(g) for g in stage.goals)] += stage.weight
+    legs = np.zeros((len(stations), len(stations)))
+    for (a, b), expected in task.legs().items():
+        legs[stations.index(a), stations.index(b)] += expected
+    return ScoreTables(
+        starts=np.array([stations.index(s) for s in starts], dtype=np.int64),
+        goals=np.array([stations.index(g) for g in goals], dtype=np.int64),
+        stage_weights=weights,
+        tie_penalties=_tie_penalties(weights, len(goals), ties),
+        discounts=np.exp(-beta * np.arange(2 * num_floor + 3)),
+        prefix_weights=_prefix_table(prefix, num_floor + 2),
+        legs=legs,
+        c=float(c),
+        beta=float(beta),
+        tie_tolerance=float(tie_tolerance),
+    )
+
+
+def _tie_penalties(weights: npt.NDArray[np.float64], num_goals: int, ties: Ties) -> npt.NDArray[np.float64]:
+    penalties = np.zeros((len(weights), num_goals, 1 << num_goals))
+    valid_sets = np.arange(1 << num_goals)
+    for tied in range(1 << num_goals):
+        num_tied = np.array([int(v).bit_count() for v in valid_sets & tied])
+        wrong = np.where(num_tied >= 2, 1.0 if ties == "strict" else 1.0 - 1.0 / np.maximum(num_tied, 1), 0.0)
+        for goal in range(num_goals):
+            if tied >> goal & 1:
+                # The true goal is in the valid set whether it is counted among the tied ones or not.
+                has_goal = (valid_sets >> goal & 1).astype(bool)
+                penalties[:, goal, tied] = weights[:, has_goal] @ wrong[has_goal]
+    return penalties
+
+
+def _prefix_table(prefix: PrefixSpec, longest: int) -> npt.NDArray[np.float64]:
+    table = np.zeros((longest + 1, longest + 1))
+    for length in range(2, longest + 1):
+        table[length, 1:length] = prefix_weights(prefix, length)
+    return table

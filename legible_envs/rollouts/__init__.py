@@ -1,0 +1,11 @@
+"""Rollouts and trajectories: what they are, how they are recorded, and the files they are kept in (npz, CSV, Minari).
+
+>>> from legible_envs.rollouts import RecordRollouts, write_csv
+>>> env = RecordRollouts(gym.make("LegibleOvercooked-v0"))      # doctest: +SKIP
+>>> gymnasium.utils.play.play(env)                              # doctest: +SKIP
+>>> write_csv("walks.csv", env.trajectories(participant="p1"))  # doctest: +SKIP
+"""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

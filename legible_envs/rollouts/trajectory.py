@@ -1,0 +1,292 @@
+"""Trajectories: one person's way from one start to one goal, how a prefix of it is cut, and the files they are kept in.
+
+A *rollout* is one recorded or simulated episode; a *trajectory* is the part of it from a start to a goal, with what an
+observer may know beforehand: where the person started, and which goals are possible.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from legible_envs.overcooked.layout import OvercookedLayout
+    from legible_envs.tabletop.layout import TabletopLayout
+
+__all__ = ["CUTS", "Cut", "Trajectory", "load_trajectories", "save_trajectories", "trajectories_from_rollout"]
+
+Cut = Literal["steps", "cells", "time", "arc"]
+CandidateSet = Literal["task", "game", "all"]
+
+CUTS: Final[dict[str, str]] = {
+    "steps": "states 1..t of T, t = clip(round(f*T), 1, T-1); on a grid T counts the floor cells, repeats dropped, "
+    "and the goal station as last node",
+    "cells": "states 0..floor(f*(n-1)) of the n = T-1 states before the last (the goal's own node)",
+    "time": "states up to time t_0 + f*(t_T - t_0), at least one",
+    "arc": "states up to arc length f*(whole length), at least one",
+}
+"""What "fraction f observed" means under each cut; printed beside every result."""
+
+_SLACK: Final = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """One way from a start to a goal. Immutable, compared by content.
+
+    On a grid the person walks from station to station: ``states`` are the floor cells, consecutive repeats dropped,
+    and the goal station's own cell as the last node, ``(row, col)`` each. Elsewhere they are positions in metres.
+
+    Attributes:
+        states: ``(T, d)`` cells (integers) or positions (floats, finite). May be empty: nothing observed yet.
+        times: ``(T,)`` seconds, never decreasing; on a grid the time of arrival. None counts 0, 1, 2, ….
+        start: Name of where the person came from.
+        goal: Name of the goal reached; None where it is not known.
+        candidates: Goals that were possible, each once; the order does not matter and is kept.
+        participant: Who.
+        condition: Under which condition.
+        layout: The kitchen or the table it happened at, if any.
+        layout_name: Its name, if it has one.
+        candidate_set: Where ``candidates`` come from: valid by precedence (``"task"``), valid in the running game
+            (``"game"``), or all goals of that kind in reach (``"all"``).
+        complete: Whether the last state is the goal's own; False for a prefix.
+        goal_positions: Where each of ``candidates`` is, in their order and the frame of ``states``; None where the
+            layout tells or nobody knows.
+
+    Raises:
+        ValueError: Wrong shapes, NaN, times that run backwards, no or repeated candidates, a goal that is not one.
+
+    Example:
+        >>> walk = Trajectory([(1, 1), (1, 2), (0, 2)], goal="pot", candidates=("pot", "onion"))
+        >>> walk.prefix(0.5).states.tolist()
+        [[1, 1], [1, 2]]
+    """
+
+    states: npt.NDArray[Any]
+    times: npt.NDArray[np.float64] = None  # type: ignore[assignment]
+    start: str = ""
+    goal: str | None = None
+    candidates: tuple[str, ...] = ()
+    participant: str = ""
+    condition: str = ""
+    layout: OvercookedLayout | TabletopLayout | None = None
+    layout_name: str = ""
+    candidate_set: CandidateSet = "all"
+    complete: bool = True
+    goal_positions: tuple[tuple[float, ...], ...] | None = None
+
+    def __post_init__(self) -> None:
+        states = _checked_states(self.states)
+        object.__setattr__(self, "states", states)
+        object.__setattr__(self, "times", _checked_times(self.times, len(states)))
+        candidates = (self.candidates,) if isinstance(self.candidates, str) else tuple(self.candidates)
+        object.__setattr__(self, "candidates", candidates)
+        if not candidates or len(set(candidates)) != len(candidates):
+            raise ValueError(f"`candidates` must name at least one goal, each once, got {candidates!r}")
+        if not all(isinstance(name, str) and name for name in candidates):
+            raise ValueError(f"`candidates` must be non-empty names, got {candidates!r}")
+        if self.goal is not None and self.goal not in candidates:
+            raise ValueError(f"the goal {self.goal!r} is not among the candidates {candidates}")
+        if self.candidate_set not in ("task", "game", "all"):
+            raise ValueError(f"`candidate_set` must be 'task', 'game' or 'all', got {self.candidate_set!r}")
+        if self.goal_positions is not None:
+            positions = _checked_positions(self.goal_positions, len(candidates), states)
+            object.__setattr__(self, "goal_positions", positions)
+
+    # -- the observed part --------------------------------------------------------------------------------------------
+
+    def prefix(self, fraction: float, cut: Cut = "steps") -> Trajectory:
+        """The part seen when a fraction is observed.
+
+        Args:
+            fraction: In (0, 1]; 0 too for ``"cells"``, ``"time"`` and ``"arc"``, whose prefixes begin with one state.
+            cut: Fraction of what; see :data:`CUTS`.
+
+        Raises:
+            ValueError: The fraction is out of range, the cut unknown, or this is a prefix already.
+        """
+        return self.first(self.prefix_length(fraction, cut))
+
+    def prefix_length(self, fraction: float, cut: Cut = "steps") -> int:
+        """Number of states in :meth:`prefix`."""
+        if cut not in CUTS:
+            raise ValueError(f"unknown cut {cut!r}; expected one of {list(CUTS)}")
+        if not (0 <= fraction <= 1) or (fraction == 0 and cut == "steps"):
+            raise ValueError(f"`fraction` must be in {'(0, 1]' if cut == 'steps' else '[0, 1]'}, got {fraction!r}")
+        if not self.complete:
+            raise ValueError("a fraction of a prefix has no meaning; cut the complete trajectory")
+        if len(self.states) < 2:
+            raise ValueError(f"a trajectory of {len(self.states)} states has no prefix; at least 2 are needed")
+        return _CUTTERS[cut](self, float(fraction))
+
+    def first(self, count: int) -> Trajectory:
+        """The first ``count`` states as a prefix (0: nothing observed yet)."""
+        if not 0 <= count <= len(self.states):
+            raise ValueError(f"`count` must be 0..{len(self.states)}, got {count}")
+        # Skips the checks: a part of valid states is valid, and predictors cut millions of prefixes.
+        part = object.__new__(Trajectory)
+        part.__dict__.update(self.__dict__)
+        part.__dict__.update(states=self.states[:count], times=self.times[:count], complete=False)
+        part.__dict__.pop("arc_lengths", None)
+        return part
+
+    @property
+    def num_states(self) -> int:
+        """Number of states ``T``."""
+        return len(self.states)
+
+    @property
+    def is_grid(self) -> bool:
+        """Whether the states are cells of a grid rather than positions."""
+        return bool(np.issubdtype(self.states.dtype, np.integer))
+
+    @cached_property
+    def arc_lengths(self) -> npt.NDArray[np.float64]:
+        """``(T,)`` way covered until each state: steps on a grid (Manhattan), Euclidean elsewhere."""
+        steps = np.diff(self.states.astype(np.float64), axis=0)
+        lengths = np.abs(steps).sum(axis=1) if self.is_grid else np.sqrt((steps**2).sum(axis=1))
+        return np.concatenate([np.zeros(min(len(self.states), 1)), np.cumsum(lengths)])
+
+    # -- value semantics ----------------------------------------------------------------------------------------------
+
+    def _content(self) -> tuple[Any, ...]:
+        return tuple(getattr(self, f.name) for f in fields(self))
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Trajectory):
+            return NotImplemented
+        return self._content()[2:] == other._content()[2:] and all(
+            a.dtype == b.dtype and np.array_equal(a, b)
+            for a, b in ((self.states, other.states), (self.times, other.times))
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.states.tobytes(), self.states.shape, self._content()[2:]))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Trajectory, self._content()
+
+
+def _checked_states(states: npt.ArrayLike) -> npt.NDArray[Any]:
+    try:
+        array = np.array(states)
+    except ValueError as error:
+        raise ValueError(f"states must be a (T, d) array; these have mixed dimensions: {error}") from error
+    if array.size == 0 and array.ndim == 1:
+        array = np.zeros((0, 2), dtype=np.int64)
+    if array.ndim != 2 or array.shape[1] == 0:
+        raise ValueError(f"states must be a (T, d) array, got shape {array.shape}")
+    if np.issubdtype(array.dtype, np.integer):
+        array = array.astype(np.int64)
+    elif np.issubdtype(array.dtype, np.floating):
+        array = array.astype(np.float64)
+        bad = np.argwhere(~np.isfinite(array))
+        if len(bad):
+            row, column = bad[0]
+            raise ValueError(f"state {row}, coordinate {column} is {array[row, column]}; states must be finite")
+    else:
+        raise ValueError(f"states must be integers (cells) or floats (positions), got dtype {array.dtype}")
+    array.flags.writeable = False
+    return array
+
+
+def _checked_positions(positions: npt.ArrayLike, count: int, states: npt.NDArray[Any]) -> tuple[tuple[float, ...], ...]:
+    try:
+        array = np.array(positions, dtype=np.float64)
+    except ValueError as error:
+        raise ValueError(f"goal positions must be numbers of one dimension: {error}") from error
+    if array.ndim != 2 or len(array) != count or not np.isfinite(array).all():
+        raise ValueError(f"expected one finite position for each of {count} candidates, got {positions!r}")
+    if len(states) and array.shape[1] != states.shape[1]:
+        raise ValueError(f"goal positions have dimension {array.shape[1]}, the states {states.shape[1]}")
+    return tuple(tuple(row) for row in array.tolist())
+
+
+def _checked_times(times: npt.ArrayLike | None, count: int) -> npt.NDArray[np.float64]:
+    array = np.arange(count, dtype=np.float64) if times is None else np.array(times, dtype=np.float64)
+    if array.shape != (count,):
+        raise ValueError(f"times must have shape ({count},) like the states, got {array.shape}")
+    if not np.isfinite(array).all() or (np.diff(array) < 0).any():
+        raise ValueError("times must be finite and never decrease")
+    array.flags.writeable = False
+    return array
+
+
+# -- cuts -------------------------------------------------------------------------------------------------------------
+
+
+def _cut_steps(walk: Trajectory, fraction: float) -> int:
+    return min(max(round(fraction * len(walk.states)), 1), len(walk.states) - 1)
+
+
+def _cut_cells(walk: Trajectory, fraction: float) -> int:
+    return int(np.floor(fraction * (len(walk.states) - 2) + _SLACK)) + 1
+
+
+def _cut_time(walk: Trajectory, fraction: float) -> int:
+    first, last = walk.times[0], walk.times[-1]
+    return _count_up_to(walk.times - first, fraction * (last - first))
+
+
+def _cut_arc(walk: Trajectory, fraction: float) -> int:
+    return _count_up_to(walk.arc_lengths, fraction * walk.arc_lengths[-1])
+
+
+def _count_up_to(values: npt.NDArray[np.float64], limit: float) -> int:
+    return max(int(np.count_nonzero(values <= limit + _SLACK * max(1.0, abs(limit)))), 1)
+
+
+_CUTTERS: Final[dict[str, Callable[[Trajectory, float], int]]] = {
+    "steps": _cut_steps,
+    "cells": _cut_cells,
+    "time": _cut_time,
+    "arc": _cut_arc,
+}
+
+
+# -- files ------------------------------------------------------------------------------------------------------------
+
+
+def save_trajectories(path: str | os.PathLike[str], trajectories: Iterable[Trajectory]) -> Path:
+    """Write trajectories to one ``.npz``, all or nothing; no pickles. See :mod:`legible_envs.rollouts.npz_files`.
+
+    Returns:
+        The path written.
+
+    Raises:
+        ValueError: Cells and positions, or different dimensions, in one file.
+        OSError: The file cannot be written; what was there before is untouched.
+    """
+    from legible_envs.rollouts.npz_files import write
+
+    return write(path, trajectories)
+
+
+def load_trajectories(path: str | os.PathLike[str]) -> list[Trajectory]:
+    """Read trajectories back, equal to those saved and in their order.
+
+    Raises:
+        FileNotFoundError: No such file.
+        ValueError: Not a file of trajectories, damaged, or of a newer schema.
+    """
+    from legible_envs.rollouts.npz_files import read
+
+    return read(path)
+
+
+def trajectories_from_rollout(views: Sequence[Any], **options: Any) -> list[Trajectory]:
+    """The walks in an episode of the kitchen, from the views of its states in order.
+
+    See :func:`legible_envs.overcooked.trajectories.trajectories_from_views`, which this calls, for the options.
+    """
+    from legible_envs.overcooked.trajectories import trajectories_from_views
+
+    return trajectories_from_views(views, **options)

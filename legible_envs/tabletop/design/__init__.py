@@ -1,0 +1,1 @@
+"""The design of tables: the workspace with its rules, genomes, validity and measures."""

@@ -1,0 +1,1 @@
+"""Shortest paths of the hand among virtual obstacles, and points in motion along them."""

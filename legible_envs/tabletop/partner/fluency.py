@@ -1,0 +1,251 @@
+"""How fluently a person and a robot work together, from a log of who did what when.
+
+The four objective measures are those of G. Hoffman, *Evaluating Fluency in Human-Robot Collaboration*, IEEE
+Transactions on Human-Machine Systems 49(3), 2019: human idle time, robot idle time, concurrent activity and functional
+delay, each as a share of the time that the task took. To these comes what reading the person early is about: when the
+robot was sure, whether rightly, and how often both wanted the same object.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable, Iterable
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+from legible_envs.tabletop.partner.interface import Command, Senses
+
+__all__ = ["Reading", "TeamMetrics", "Tick", "tick_of"]
+
+
+@dataclass(frozen=True, slots=True)
+class Tick:
+    """One line of a log: what held from ``time`` until the next line.
+
+    An *action* is a stretch of lines in a row with the same label; None is no action. A person's action is a reach with
+    what follows until the object is placed, a robot's is to fetch one object.
+
+    Attributes:
+        time: Seconds, not before that of the line before.
+        human: Label of what the person does; None while idle.
+        robot: Label of what the robot does; None while idle (waiting, or on its way home).
+        reach: How many reaches the person has begun; 0 before the first.
+        taken: What the person holds.
+        predicted: What the robot is sure the person reaches for; None while it is not.
+        choices: How many objects the person may validly reach for; 0 while they must wait. Does not count while they
+            hold something. A real choice unless told otherwise.
+        conflict: Whether the robot gave up its target in this line because the person took it.
+        lost: Whether the robot took in this line what the person was going for, where that is known.
+    """
+
+    time: float
+    human: Hashable | None = None
+    robot: Hashable | None = None
+    reach: int = 0
+    taken: str | None = None
+    predicted: str | None = None
+    choices: int = 2
+    conflict: bool = False
+    lost: bool = False
+
+
+def tick_of(senses: Senses, command: Command, human_active: bool, lost: bool = False) -> Tick:
+    """The line of a log for one step of a robot.
+
+    Args:
+        senses: What the robot sensed.
+        command: What it did.
+        human_active: Whether the person is doing something: moving their hand, taking or placing an object.
+        lost: Whether the robot took what the person was going for.
+    """
+    return Tick(
+        time=senses.time,
+        human=senses.reach_number if human_active else None,
+        robot=command.target,
+        reach=senses.reach_number,
+        taken=senses.person_holding,
+        predicted=command.predicted,
+        choices=len(senses.goals),
+        conflict=command.conflict,
+        lost=lost,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """How a robot read one reach that ended in taking an object.
+
+    Attributes:
+        reach: Number of the reach.
+        taken: What the person took.
+        duration: Seconds from the reach's first line with anything to reach for to that in which it was taken.
+        decision_time: Seconds from its first line to that in which the robot was sure for the first time; all of
+            ``duration`` where it never was.
+        predicted: What it was sure of then; None where it never was.
+        choices: The most objects that could validly be reached for in one line; with 1 there is nothing to read.
+    """
+
+    reach: int
+    taken: str
+    duration: float
+    decision_time: float
+    predicted: str | None
+    choices: int
+
+    @property
+    def fraction(self) -> float:
+        """Share of the reach that the robot had to see; 1 where it never was sure, or the reach took no time."""
+        return self.decision_time / self.duration if self.duration > 0 else 1.0
+
+    @property
+    def correct(self) -> bool:
+        """Whether the first goal the robot was sure of is the one that was taken."""
+        return self.predicted == self.taken
+
+
+@dataclass(slots=True)
+class _Action:
+    agent: str
+    label: Hashable
+    begin: float
+    end: float | None = None
+
+
+class TeamMetrics:
+    """Team measures of one episode, kept up to date line by line.
+
+    Attributes:
+        readings: Every reach that ended in taking an object.
+        conflicts: How often both wanted the same object: the person took the robot's target, or the robot took what
+            the person was known to go for.
+        goals_lost: How often it was the latter, the price of acting on a wrong guess.
+    """
+
+    def __init__(self) -> None:
+        self.readings: list[Reading] = []
+        self.conflicts = 0
+        self.goals_lost = 0
+        self._first: Tick | None = None
+        self._last: Tick | None = None
+        self._human_idle = self._robot_idle = self._concurrent = 0.0
+        self._actions: list[_Action] = []  # in the order they began
+        self._acting: dict[str, _Action | None] = {"human": None, "robot": None}
+        self._reach: Tick | None = None  # the line in which the last reach began
+        self._reach_ended = True
+        self._choices = 0
+        self._sure: Tick | None = None  # the line in which the robot was sure for the first time in this reach
+        self._completed = math.nan
+
+    def add(self, tick: Tick) -> None:
+        """Add a line.
+
+        Raises:
+            ValueError: Time runs backwards or is not finite.
+        """
+        last = self._last
+        if not math.isfinite(tick.time) or (last is not None and tick.time < last.time):
+            before = "" if last is None else f" after {last.time}"
+            raise ValueError(f"a log's times must be finite and never decrease, got {tick.time}{before}")
+        if last is None:
+            self._first = last = tick
+        self._count_time(last, tick.time)
+        self._follow_actions(tick)
+        self._follow_reach(tick)
+        self.conflicts += tick.conflict + tick.lost
+        self.goals_lost += tick.lost
+        self._last = tick
+
+    def complete(self, time: float) -> None:
+        """Note that the task was finished; the last line holds until then.
+
+        Raises:
+            ValueError: Before the last line.
+        """
+        self.add(replace(self._last or Tick(time), time=time, conflict=False, lost=False))
+        self._completed = time
+
+    def summary(self) -> dict[str, float]:
+        """The measures so far.
+
+        Returns:
+            ``time`` since the first line and ``completion_time``, the same once the task is done (NaN before), in
+            seconds; as shares of ``time`` (NaN where it is 0) ``human_idle``, ``robot_idle``, ``concurrent_activity``
+            and ``functional_delay``; ``conflicts``, ``goals_lost`` and ``reaches``, counted; over the reaches with more
+            than one choice (NaN without any) the means ``decision_time`` in seconds and ``decision_fraction``, in which
+            a reach that the robot was never sure of counts whole, and the shares ``decided`` and ``decided_rightly``.
+
+            Functional delay adds up, for every action (in the order they began, the person's first of two at once)
+            that follows one of the other agent, the time from that one's end to its own beginning: less than 0 where
+            they overlap.
+        """
+        start = self._first.time if self._first else 0.0
+        time = self._last.time - start if self._last else 0.0
+        readings = [reading for reading in self.readings if reading.choices > 1]
+
+        def share(value: float) -> float:
+            return value / time if time > 0 else math.nan
+
+        def mean(values: Iterable[float]) -> float:
+            return math.fsum(values) / len(readings) if readings else math.nan
+
+        return {
+            "time": time,
+            "completion_time": self._completed - start,
+            "human_idle": share(self._human_idle),
+            "robot_idle": share(self._robot_idle),
+            "concurrent_activity": share(self._concurrent),
+            "functional_delay": share(self._functional_delay()),
+            "conflicts": float(self.conflicts),
+            "goals_lost": float(self.goals_lost),
+            "reaches": float(len(self.readings)),
+            "decision_time": mean(r.decision_time for r in readings),
+            "decision_fraction": mean(r.fraction for r in readings),
+            "decided": mean(r.predicted is not None for r in readings),
+            "decided_rightly": mean(r.correct for r in readings),
+        }
+
+    def _count_time(self, last: Tick, now: float) -> None:
+        step = now - last.time
+        if last.human is None:
+            self._human_idle += step
+        if last.robot is None:
+            self._robot_idle += step
+        if last.human is not None and last.robot is not None:
+            self._concurrent += step
+
+    def _follow_actions(self, tick: Tick) -> None:
+        for agent, label in (("human", tick.human), ("robot", tick.robot)):
+            acting = self._acting[agent]
+            if acting is not None and acting.label != label:
+                acting.end = tick.time
+                acting = None
+            if acting is None and label is not None:
+                acting = _Action(agent, label, tick.time)
+                self._actions.append(acting)
+            self._acting[agent] = acting
+
+    def _functional_delay(self) -> float:
+        now = self._last.time if self._last else 0.0
+        return math.fsum(
+            following.begin - (now if action.end is None else action.end)
+            for action, following in pairwise(self._actions)
+            if following.agent != action.agent
+        )
+
+    def _follow_reach(self, tick: Tick) -> None:
+        if self._reach is None or tick.reach != self._reach.reach:
+            self._reach_ended = True  # given up, if it had not
+            if tick.reach > 0 and (tick.choices > 0 or tick.taken is not None):
+                self._reach, self._reach_ended, self._sure, self._choices = tick, False, None, 0
+        if self._reach is None or self._reach_ended:
+            return
+        if tick.taken is None:
+            self._choices = max(self._choices, tick.choices)
+            if self._sure is None and tick.predicted is not None:
+                self._sure = tick
+            return
+        duration = tick.time - self._reach.time
+        sure = self._sure
+        decision, goal = (duration, None) if sure is None else (sure.time - self._reach.time, sure.predicted)
+        self.readings.append(Reading(tick.reach, tick.taken, duration, decision, goal, self._choices))
+        self._reach_ended = True

@@ -1,0 +1,228 @@
+"""Who watches and who helps at the table: a predictor that only believes, or a robot that also acts."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Mapping
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from legible_envs.support.plugins import import_target
+from legible_envs.tabletop.game.game import DT, RATE, TableGame
+from legible_envs.tabletop.partner.fluency import TeamMetrics, tick_of
+from legible_envs.tabletop.partner.intent import ReachWatcher
+from legible_envs.tabletop.partner.interface import Command, Senses
+from legible_envs.tabletop.partner.robot import RobotPartner
+
+__all__ = ["GRIPPER_SPEED", "MEASURES", "Team", "make_partner", "read_predictor"]
+
+GRIPPER_SPEED: Final = 1.0
+"""No gripper is faster, m/s."""
+
+GRIPPER_REACH: Final = 0.03
+"""How near to an object or its place a gripper can close or open, m."""
+
+MEASURES: Final = (
+    "completion_time",
+    "human_idle",
+    "robot_idle",
+    "concurrent_activity",
+    "functional_delay",
+    "conflicts",
+    "goals_lost",
+    "decision_time",
+    "decision_fraction",
+    "decided",
+    "decided_rightly",
+)
+
+_IDLE_SPEED: Final = 0.01
+
+
+def read_predictor(spec: Any) -> Any:
+    """What :class:`.ReachWatcher` takes for what a user names; ``"eq1"`` is built in."""
+    return None if isinstance(spec, str) and spec == "eq1" else spec
+
+
+def make_partner(spec: Any, predictor: Any, threshold: float) -> Any:
+    """A robot partner from what a user names.
+
+    Args:
+        spec: ``"robot"``; a mapping of arguments of :class:`~legible_envs.tabletop.partner.robot.RobotPartner`;
+            ``"module:Class"``, made without arguments; or an object with ``reset`` and ``step``, which is copied.
+        predictor: What a ``RobotPartner`` reads the person with.
+        threshold: Of a ``RobotPartner``.
+
+    Raises:
+        ValueError: It cannot be imported or made.
+        TypeError: It is no partner.
+    """
+    if spec == "robot":
+        spec = {}
+    if isinstance(spec, Mapping):
+        try:
+            return RobotPartner(read_predictor(predictor), **{"threshold": threshold, "rate": float(RATE), **spec})
+        except TypeError as error:
+            raise ValueError(f"`partner` has arguments that RobotPartner does not take: {error}") from error
+    if predictor is not None:
+        raise ValueError("`predictor` is for partner='robot'; a partner of your own brings its own")
+    if isinstance(spec, str):
+        if ":" not in spec:
+            raise ValueError(f"`partner` must be None, 'robot', a mapping, 'module:Class' or an object, got {spec!r}")
+        try:
+            spec = import_target(spec)()
+        except Exception as error:
+            raise ValueError(f"partner {spec!r} cannot be made: {type(error).__name__}: {error}") from error
+    if isinstance(spec, type) or not all(callable(getattr(spec, name, None)) for name in ("reset", "step")):
+        raise TypeError(f"a partner is an object with the methods `reset` and `step`, got {spec!r}")
+    return copy.deepcopy(spec)
+
+
+class Team:
+    """What shares the table with the person.
+
+    Time goes in ticks: at the end of each, whoever watches senses; a robot's command holds for the next tick.
+
+    Args:
+        partner: As of :func:`make_partner`, or None.
+        watcher: Used where there is no partner; may be None too.
+
+    Attributes:
+        gripper: ``(x, y)``, or None where there is no robot.
+        velocity: ``(x, y)`` of the gripper in the last tick, m/s.
+        command: The robot's last command, or None.
+        belief: ``{goal: probability}`` of the present reach, or None.
+    """
+
+    def __init__(self, partner: Any = None, watcher: ReachWatcher | None = None) -> None:
+        self.partner = partner
+        self.watcher = watcher
+        self.gripper: tuple[float, float] | None = None
+        self.velocity = (0.0, 0.0)
+        self.command: Command | None = None
+        self.belief: dict[str, float] | None = None
+        self._metrics = TeamMetrics()
+        self._senses: Senses | None = None
+        self._lost = False
+
+    @property
+    def is_there(self) -> bool:
+        """Whether anybody watches."""
+        return self.partner is not None or self.watcher is not None
+
+    def begin(self, game: TableGame, rng: np.random.Generator) -> None:
+        """Begin an episode."""
+        if self.watcher is not None:
+            self.watcher.reset(game.layout, game.task)
+        if self.partner is not None:
+            at = self.partner.reset(game.layout, game.task, rng)
+            self.gripper = self._home(game) if at is None else _pair(at, "what a partner's `reset` returns")
+            self.velocity = (0.0, 0.0)
+            self._metrics = TeamMetrics()
+        self.sense(game)
+
+    def act(self, game: TableGame) -> int:
+        """Carry out the robot's command for one tick; returns how many subtasks this finished."""
+        command = self.command
+        if command is None or self.gripper is None:
+            return 0
+        done = 0
+        wanted, held = game.goal, game.robot_holding
+        if command.release:
+            done = game.robot_put(self.gripper, GRIPPER_REACH)
+        if command.grasp is not None and command.grasp in game.index:
+            there = game.positions[game.index[command.grasp]]
+            if math.dist(self.gripper, there) <= GRIPPER_REACH:
+                game.robot_take(command.grasp)
+        self._lost = wanted is not None and game.robot_holding == game.index[wanted] != held
+        self._move(command, game)
+        return done
+
+    def log(self, game: TableGame, has_acted: bool) -> None:
+        """Note what the tick that ends now was like.
+
+        Args:
+            game: As it is at the end of the tick.
+            has_acted: Whether the person took or placed something in it.
+        """
+        if self._senses is not None and self.command is not None:
+            active = has_acted or game.speed > _IDLE_SPEED
+            self._metrics.add(tick_of(self._senses, self.command, active, self._lost))
+            if game.progress.is_over:
+                self._metrics.complete(game.time)
+
+    def sense(self, game: TableGame) -> None:
+        """Look at the table as it is now."""
+        if not self.is_there:
+            return
+        senses = self._sensed(game)
+        if self.partner is not None:
+            self._senses, self.command = senses, self.partner.step(senses)
+            belief = self.command.belief
+        else:
+            assert self.watcher is not None
+            belief = self.watcher.observe(senses) if senses.person_holding is None or senses.goals else None
+        self.belief = None if belief is None else {goal: float(p) for goal, p in belief.items()}
+
+    def info(self) -> dict[str, Any]:
+        """What ``info`` says about belief and robot; None where a measure is not known yet."""
+        if not self.is_there:
+            return {}
+        # A mapping in any case: vector environments cannot stack one with None.
+        info: dict[str, Any] = {"belief": dict(self.belief or {})}
+        if self.command is not None:
+            summary = self._metrics.summary()
+            info |= {name: summary[name] if math.isfinite(summary[name]) else None for name in MEASURES}
+            info["robot_state"] = self.command.state
+            info["robot_target"] = self.command.target
+        return info
+
+    def summary(self) -> dict[str, float]:
+        """Measures of the team so far, see :meth:`~legible_envs.tabletop.partner.fluency.TeamMetrics.summary`."""
+        return self._metrics.summary()
+
+    def _move(self, command: Command, game: TableGame) -> None:
+        assert self.gripper is not None
+        x, y = _pair(command.velocity, "the velocity of a command")
+        speed = math.hypot(x, y)
+        if speed > GRIPPER_SPEED:
+            x, y = x * GRIPPER_SPEED / speed, y * GRIPPER_SPEED / speed
+        width, depth = game.layout.table.size
+        there = min(max(self.gripper[0] + x * DT, 0.0), width), min(max(self.gripper[1] + y * DT, 0.0), depth)
+        self.velocity = (there[0] - self.gripper[0]) * RATE, (there[1] - self.gripper[1]) * RATE
+        self.gripper = there
+        game.carry_along(there)
+
+    def _sensed(self, game: TableGame) -> Senses:
+        held, gripped = game.holding, game.robot_holding
+        reaches = game.reaches
+        gripper = game.hand if self.gripper is None else self.gripper
+        return Senses(
+            time=game.time,
+            hand=np.array(game.hand),
+            reach=reaches.points,
+            times=reaches.times,
+            reach_number=reaches.number,
+            start=reaches.points[0],
+            goals=game.goals,
+            free=game.robot_goals,
+            positions=game.positions.copy(),
+            person_holding=game.names[held] if held >= 0 else None,
+            gripper=np.array(gripper),
+            holding=game.names[gripped] if gripped >= 0 else None,
+        )
+
+    @staticmethod
+    def _home(game: TableGame) -> tuple[float, float]:
+        width, depth = game.layout.table.size
+        return width / 2, depth - 0.05
+
+
+def _pair(value: npt.ArrayLike, what: str) -> tuple[float, float]:
+    array = np.asarray(value, dtype=np.float64)
+    if array.shape != (2,) or not np.isfinite(array).all():
+        raise ValueError(f"{what} must be two finite numbers, got {value!r}")
+    return float(array[0]), float(array[1])

@@ -1,0 +1,41 @@
+from .archives import WorkspaceArchive, make_archive
+from .emitters.annealing import AnnealingEmitter
+from .emitters.checks import check_emitter
+from .emitters.covariance import CmaMaeEmitter, CmaMeEmitter
+from .emitters.differential_evolution import DifferentialEvolutionEmitter
+from .emitters.gradient_arborescence import GradientArborescenceEmitter
+from .emitters.improve import ImproveWorkspaceEmitter
+from .emitters.mutation import MutationEmitter
+from .emitters.novelty import NoveltyLocalCompetitionEmitter
+from .emitters.random import RandomWorkspaceEmitter
+from .emitters.registry import list_emitters, make_emitter, register_emitter
+from .errors import CheckpointError, EmitterError, SearchError, SearchInterrupted
+from .evaluator import Evaluator
+from .runs.result import SearchResult, load_run
+from .searching import search
+
+__all__ = [
+    "AnnealingEmitter",
+    "CheckpointError",
+    "CmaMaeEmitter",
+    "CmaMeEmitter",
+    "DifferentialEvolutionEmitter",
+    "EmitterError",
+    "Evaluator",
+    "GradientArborescenceEmitter",
+    "ImproveWorkspaceEmitter",
+    "MutationEmitter",
+    "NoveltyLocalCompetitionEmitter",
+    "RandomWorkspaceEmitter",
+    "SearchError",
+    "SearchInterrupted",
+    "SearchResult",
+    "WorkspaceArchive",
+    "check_emitter",
+    "list_emitters",
+    "load_run",
+    "make_archive",
+    "make_emitter",
+    "register_emitter",
+    "search",
+]

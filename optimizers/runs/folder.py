@@ -1,0 +1,197 @@
+"""The folder of a run: what a search leaves behind for people, reports and later sessions.
+
+=============== ======================================================================================================
+``config.json`` the manifest: versions, settings, seed, git revision, and the result once there is one
+``metrics.csv`` one row per logged iteration (:data:`COLUMNS`)
+``archive.npz`` the elites as plain arrays (:data:`optimizers.archives.FIELDS`)
+``best.txt``    the best layout, drawn in characters; ``best.json`` instead where layouts have a ``to_json()``
+``checkpoint/`` what :mod:`optimizers.runs.checkpoint` needs to continue
+=============== ======================================================================================================
+
+Every file is replaced in one step, so a run that is killed leaves whole files; ``metrics.csv`` alone is appended to.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import platform
+import subprocess
+import sys
+from collections.abc import Iterable, Mapping
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from legible_envs.support.files import remove_leftovers, write_atomically
+from optimizers.errors import SearchError
+
+__all__ = ["COLUMNS", "RunFolder", "git_revision", "package_versions", "pickle_versions"]
+
+COLUMNS = (
+    "iteration",
+    "phase",
+    "evaluations",
+    "seconds",
+    "best",
+    "qd_score",
+    "coverage",
+    "elites",
+    "evaluations_per_second",
+)
+SCHEMA = 1
+
+
+class RunFolder:
+    """One run's folder.
+
+    Args:
+        path: The folder; created by :meth:`create`.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.checkpoints = path / "checkpoint"
+        self.archive = path / "archive.npz"
+        self._config = path / "config.json"
+        self._metrics = path / "metrics.csv"
+        self._best = path / "best.txt"
+        self._best_json = path / "best.json"
+
+    @property
+    def holds_a_run(self) -> bool:
+        """Whether something of a run lies there."""
+        return self._config.exists() or self.archive.exists() or any(self.checkpoints.glob("*.checkpoint"))
+
+    def create(self, *, overwrite: bool) -> None:
+        """Make the folder ready for a new run.
+
+        Raises:
+            SearchError: It holds a run already and ``overwrite`` is False.
+        """
+        if self.holds_a_run:
+            if not overwrite:
+                raise SearchError(
+                    f"{self.path} already holds a run: continue it with resume=True, choose another folder, or pass "
+                    "overwrite=True to replace it"
+                )
+            best = (self._best, self._best_json)
+            for file in (self._config, self._metrics, self.archive, *best, *self.checkpoints.glob("*.checkpoint")):
+                file.unlink(missing_ok=True)
+        self.path.mkdir(parents=True, exist_ok=True)
+        remove_leftovers(self.path)
+
+    def read_config(self) -> dict[str, Any]:
+        """The manifest.
+
+        Raises:
+            SearchError: There is none, or it is not one.
+        """
+        try:
+            config = json.loads(self._config.read_text(encoding="utf-8"))
+        except FileNotFoundError as error:
+            raise SearchError(f"{self.path} is not the folder of a run: it has no config.json") from error
+        except ValueError as error:
+            raise SearchError(f"{self._config} is not a manifest of a run: {error}") from error
+        if not isinstance(config, dict) or config.get("schema") != SCHEMA:
+            raise SearchError(f"{self._config} is not a manifest this version reads (schema {SCHEMA})")
+        return config
+
+    def write_config(self, config: Mapping[str, Any]) -> None:
+        """Write the manifest."""
+        text = json.dumps({"schema": SCHEMA, **config}, indent=2) + "\n"
+        write_atomically(self._config, lambda stream: stream.write(text.encode()))
+
+    def write_best(self, layout: object) -> None:
+        """Write the best layout: as JSON where it can say itself so, else as its drawing."""
+        as_json = getattr(layout, "to_json", None)
+        text = (str(layout) if as_json is None else as_json()).rstrip("\n") + "\n"
+        path = self._best if as_json is None else self._best_json
+        write_atomically(path, lambda stream: stream.write(text.encode()))
+
+    def rewrite_metrics(self, rows: Iterable[Mapping[str, Any]]) -> None:
+        """Write ``metrics.csv`` with exactly these rows."""
+        text = ",".join(COLUMNS) + "\n" + _as_csv(rows)
+        write_atomically(self._metrics, lambda stream: stream.write(text.encode()))
+
+    def append_metrics(self, row: Mapping[str, Any]) -> None:
+        """Add one row to ``metrics.csv``."""
+        with self._metrics.open("a", encoding="utf-8", newline="") as stream:
+            stream.write(_as_csv([row]))
+
+    def read_metrics(self) -> list[dict[str, Any]]:
+        """All whole rows of ``metrics.csv``, numbers as numbers."""
+        try:
+            with self._metrics.open(encoding="utf-8", newline="") as stream:
+                rows = [row for row in csv.DictReader(stream) if all(row.get(name) is not None for name in COLUMNS)]
+        except FileNotFoundError:
+            return []
+        return [{name: _number(row[name]) for name in COLUMNS} for row in rows]
+
+
+def package_versions() -> dict[str, str]:
+    """Versions of what a run's numbers come from."""
+    found = {"python": platform.python_version()}
+    for package in ("legible-envs", "ribs", "numpy", "numba", "gymnasium"):
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "unknown"
+    return found
+
+
+def pickle_versions() -> dict[str, str]:
+    """Versions within which a checkpoint is good."""
+    found = package_versions()
+    return {
+        "python": ".".join(found["python"].split(".")[:2]),
+        "numpy": ".".join(found["numpy"].split(".")[:2]),
+        **{name: found[name] for name in ("ribs", "legible-envs")},
+    }
+
+
+@cache
+def git_revision() -> str | None:
+    """Revision of the checkout this package runs from, ``-dirty`` if changed; None outside a checkout.
+
+    Looked up once per process: it is the code as it was loaded that matters.
+    """
+    here = Path(__file__)
+
+    def git(*arguments: str) -> str:
+        command = ["git", "-C", str(here.parent), *arguments]
+        return subprocess.run(command, capture_output=True, text=True, timeout=5, check=True).stdout.strip()
+
+    try:
+        git("ls-files", "--error-unmatch", here.name)
+        return git("describe", "--always", "--dirty", "--abbrev=40", "--exclude=*")
+    except (OSError, subprocess.SubprocessError):
+        return None
+
+
+def platform_name() -> str:
+    """System, machine and Python implementation."""
+    return f"{platform.system()} {platform.machine()}, {sys.implementation.name}"
+
+
+def _as_csv(rows: Iterable[Mapping[str, Any]]) -> str:
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    for row in rows:
+        writer.writerow(["" if row[name] is None else row[name] for name in COLUMNS])
+    return stream.getvalue()
+
+
+def _number(text: str) -> Any:
+    if text == "":
+        return None
+    try:
+        return int(text)
+    except ValueError:
+        pass
+    try:
+        return float(text)
+    except ValueError:
+        return text

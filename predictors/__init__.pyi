@@ -1,0 +1,32 @@
+from .base import GoalPredictor
+from .evaluation.decisions import ThresholdDecision
+from .grid.baselines import GridLogistic, GridNeighbours, GridNGram
+from .grid.bayesian import BayesianGoalPredictor
+from .grid.maxent_irl import MaxEntIRL
+from .grid.shortest_distance import ShortestDistance
+from .neural.models import RecurrentPredictor, TransformerPredictor
+from .reaching.baselines import ReachLogistic, ReachNeighbours
+from .reaching.bayesian import StraightLineBayesian
+from .reaching.gaussian import TimeSeriesGaussian
+from .registry import check_predictor, list_predictors, make_predictor, register_predictor
+
+__all__ = [
+    "BayesianGoalPredictor",
+    "GoalPredictor",
+    "GridLogistic",
+    "GridNGram",
+    "GridNeighbours",
+    "MaxEntIRL",
+    "ReachLogistic",
+    "ReachNeighbours",
+    "RecurrentPredictor",
+    "ShortestDistance",
+    "StraightLineBayesian",
+    "ThresholdDecision",
+    "TimeSeriesGaussian",
+    "TransformerPredictor",
+    "check_predictor",
+    "list_predictors",
+    "make_predictor",
+    "register_predictor",
+]

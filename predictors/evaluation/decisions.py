@@ -1,0 +1,243 @@
+"""Acting on a prediction: when is a robot sure enough?
+
+>>> from predictors import BayesianGoalPredictor, ThresholdDecision                  # doctest: +SKIP
+>>> decision = ThresholdDecision(BayesianGoalPredictor().fit(walks), 0.8)            # doctest: +SKIP
+>>> watcher = decision.stream(walks[0])                                              # doctest: +SKIP
+>>> watcher.update((3, 2))                                                           # doctest: +SKIP
+>>> watcher.update((2, 2))                                                           # doctest: +SKIP
+Decision(goal='onion', probability=0.83, step=2, time=0.15)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from legible_envs.rollouts.trajectory import Trajectory
+from predictors.base import TIE_TOLERANCE, GoalPredictor
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["Decision", "DecisionStream", "ThresholdDecision", "summarise_decisions"]
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """That a person is going for a goal.
+
+    Attributes:
+        goal: Which one.
+        probability: The belief in it when it was decided.
+        step: How many states had been seen, counted from 1.
+        time: Time of the last of them, as given with it.
+    """
+
+    goal: str
+    probability: float
+    step: int
+    time: float
+
+
+class ThresholdDecision:
+    """Decides as soon as one goal is at least as probable as a threshold, and stays with it.
+
+    Works with every predictor, each used causally: what it decides after a state depends on that state and those
+    before. Goals tied at the top decide nothing, whatever the threshold; nor does a belief before the first state.
+
+    Args:
+        predictor: A fitted predictor.
+        threshold: Probability ``p``, above 0 and up to 1, at which to act. Early and often wrong, or late and right:
+            :meth:`trade_off` shows what a threshold buys.
+        patience: How many states in a row the same goal must be above the threshold.
+
+    Raises:
+        ValueError: A threshold or patience out of range.
+        TypeError: Something else than a predictor.
+    """
+
+    def __init__(self, predictor: GoalPredictor, threshold: float = 0.9, *, patience: int = 1) -> None:
+        if not isinstance(predictor, GoalPredictor):
+            raise TypeError(f"`predictor` must be a GoalPredictor, got {type(predictor).__name__}")
+        if isinstance(patience, bool) or not isinstance(patience, int) or patience < 1:
+            raise ValueError(f"`patience` must be a whole number >= 1, got {patience!r}")
+        self.predictor = predictor
+        self.threshold = _checked_threshold(threshold)
+        self.patience = patience
+
+    def __repr__(self) -> str:
+        return f"ThresholdDecision({self.predictor!r}, {self.threshold!r}, patience={self.patience})"
+
+    def stream(self, context: Trajectory) -> DecisionStream:
+        """Watch one person as they move.
+
+        Args:
+            context: What is known beforehand: start, candidates, layout. Its states are not looked at.
+        """
+        return DecisionStream(self, context)
+
+    def decide(self, X: Sequence[Trajectory]) -> pd.DataFrame:
+        """When it would have acted on whole trajectories, and whether rightly.
+
+        Of a complete trajectory the last state is not shown: it is the goal's own, too late for a decision.
+
+        Args:
+            X: ``n`` complete trajectories (or prefixes, all of whose states are shown).
+
+        Returns:
+            A row per trajectory: ``trajectory`` (its number), ``participant``, ``condition``, ``layout``, ``goal``,
+            ``threshold``, ``decided`` (bool), ``decision`` (the goal decided on, ``""`` if none), ``probability``,
+            ``step`` (states seen; 0 if none), ``fraction`` (of all states, the goal's own included), ``time`` (since
+            the first state), ``lead`` (time left until the last state) — NaN if none — and ``correct`` (1 or 0;
+            undecided is 0, NaN where the goal is not known).
+        """
+        return self.trade_off(X, [self.threshold])
+
+    def trade_off(self, X: Sequence[Trajectory], thresholds: Sequence[float]) -> pd.DataFrame:
+        """The rows of :meth:`decide` for several thresholds; :func:`summarise_decisions` makes a curve of them."""
+        import pandas as pd
+
+        levels = [_checked_threshold(threshold) for threshold in thresholds]
+        walks = GoalPredictor._check_trajectories(X)
+        beliefs = self._beliefs(walks)
+        rows = [
+            _row(number, walk, level, self._first_decision(walk, belief, level))
+            for level in levels
+            for number, (walk, belief) in enumerate(zip(walks, beliefs, strict=True))
+        ]
+        return pd.DataFrame(rows, columns=list(_row(0, _NOBODY, 1.0, None)))
+
+    def _beliefs(self, walks: Sequence[Trajectory]) -> list[npt.NDArray[np.float64]]:
+        """For each trajectory ``(steps, candidates)`` the belief after 1, 2, … states."""
+        steps = [walk.num_states - walk.complete for walk in walks]
+        prefixes = [walk.first(t) for walk, count in zip(walks, steps, strict=True) for t in range(1, count + 1)]
+        rows = self.predictor.predict_proba(prefixes) if prefixes else np.zeros((0, 0))
+        ends = np.cumsum([max(count, 0) for count in steps], dtype=np.intp)
+        return [
+            rows[end - max(count, 0) : end][:, self.predictor._columns(walk)] if count > 0 else np.zeros((0, 0))
+            for walk, count, end in zip(walks, steps, ends, strict=True)
+        ]
+
+    def _first_decision(self, walk: Trajectory, beliefs: npt.NDArray[np.float64], threshold: float) -> Decision | None:
+        previous, count = None, 0
+        for step, belief in enumerate(beliefs, 1):
+            top = _sure_of(belief, threshold)
+            count = 0 if top is None else count + 1 if top == previous else 1
+            previous = top
+            if top is not None and count >= self.patience:
+                return Decision(walk.candidates[top], float(belief[top]), step, float(walk.times[step - 1]))
+        return None
+
+
+class DecisionStream:
+    """Watches one person until it is sure; made by :meth:`ThresholdDecision.stream`.
+
+    Attributes:
+        belief: ``{goal: probability}`` after the last update; the prior before the first.
+        decision: What was decided, or None so far.
+    """
+
+    def __init__(self, rule: ThresholdDecision, context: Trajectory) -> None:
+        self._rule = rule
+        self._stream = rule.predictor.stream(context)
+        self._goals = context.candidates
+        self._top: int | None = None
+        self._count = 0
+        self.belief: dict[str, float] = self._stream.belief
+        self.decision: Decision | None = None
+
+    def update(self, point: npt.ArrayLike, time: float | None = None) -> Decision | None:
+        """Add a state.
+
+        Args:
+            point: ``(d,)`` cell or position. Standing still on a cell of a grid adds nothing.
+            time: When, in seconds; one after the other without it.
+
+        Returns:
+            The decision once there is one, the same ever after; None until then.
+
+        Raises:
+            ValueError: What :meth:`predictors.base.GoalStream.update` rejects.
+        """
+        seen = self._stream.num_states
+        self.belief = self._stream.update(point, time)
+        if self.decision is not None or self._stream.num_states == seen:
+            return self.decision
+        values = np.array([self.belief[goal] for goal in self._goals])
+        top = _sure_of(values, self._rule.threshold)
+        self._count = 0 if top is None else self._count + 1 if top == self._top else 1
+        self._top = top
+        if top is not None and self._count >= self._rule.patience:
+            step, when = self._stream.num_states, self._stream.last_time
+            self.decision = Decision(self._goals[top], float(values[top]), step, when)
+        return self.decision
+
+
+def summarise_decisions(rows: pd.DataFrame, by: Sequence[str] = ("threshold",)) -> pd.DataFrame:
+    """What decisions are worth on average.
+
+    Args:
+        rows: From :meth:`ThresholdDecision.decide` or :meth:`ThresholdDecision.trade_off`.
+        by: Columns to tell apart, such as ``("condition", "threshold")``.
+
+    Returns:
+        A row per group: the columns ``by``, ``trajectories``, ``decided`` (share), ``correct`` (share of all that were
+        decided rightly), ``precision`` (share of the decisions), and the means over decisions of ``fraction``,
+        ``step``, ``time`` and ``lead`` (NaN without any).
+    """
+    made = rows[rows["decided"]]
+    keys = list(by)
+    means = rows.groupby(keys).agg(
+        trajectories=("trajectory", "size"), decided=("decided", "mean"), correct=("correct", "mean")
+    )
+    of_decisions = made.groupby(keys).agg(
+        precision=("correct", "mean"),
+        fraction=("fraction", "mean"),
+        step=("step", "mean"),
+        time=("time", "mean"),
+        lead=("lead", "mean"),
+    )
+    return means.join(of_decisions).reset_index()
+
+
+_NOBODY: Final = Trajectory(np.zeros((0, 2), dtype=np.int64), candidates=("nothing",))
+
+
+def _row(number: int, walk: Trajectory, threshold: float, decision: Decision | None) -> dict[str, Any]:
+    nan = float("nan")
+    first, last = (float(walk.times[0]), float(walk.times[-1])) if walk.num_states else (nan, nan)
+    right = None if decision is None else decision.goal == walk.goal
+    return {
+        "trajectory": number,
+        "participant": walk.participant,
+        "condition": walk.condition,
+        "layout": walk.layout_name or (walk.layout.layout_id if walk.layout is not None else ""),
+        "goal": walk.goal or "",
+        "threshold": threshold,
+        "decided": decision is not None,
+        "decision": "" if decision is None else decision.goal,
+        "probability": nan if decision is None else decision.probability,
+        "step": 0 if decision is None else decision.step,
+        "fraction": nan if decision is None else decision.step / walk.num_states,
+        "time": nan if decision is None else decision.time - first,
+        "lead": nan if decision is None else last - decision.time,
+        "correct": nan if walk.goal is None else float(bool(right)),
+    }
+
+
+def _sure_of(belief: npt.NDArray[np.float64], threshold: float) -> int | None:
+    """The candidate that is alone at the top and at least as probable as the threshold."""
+    best = belief.max()
+    if best < threshold - TIE_TOLERANCE or np.count_nonzero(belief >= best - TIE_TOLERANCE) > 1:
+        return None
+    return int(belief.argmax())
+
+
+def _checked_threshold(threshold: float) -> float:
+    if isinstance(threshold, bool) or not isinstance(threshold, int | float) or not 0 < threshold <= 1:
+        raise ValueError(f"a threshold must be above 0 and at most 1, got {threshold!r}")
+    return float(threshold)

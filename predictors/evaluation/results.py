@@ -1,0 +1,251 @@
+"""What evaluations hand back: tidy tables, and the definitions that belong beside every figure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from legible_envs.rollouts.trajectory import CUTS
+from predictors.evaluation.metrics import calibration_error, clustered_interval, log_loss, weighted_scores
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import pandas as pd
+
+__all__ = ["Evaluation", "LearningCurve"]
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """What :func:`predictors.evaluation.evaluate` found.
+
+    Attributes:
+        table: A row per predictor, repeat, trajectory and fraction observed: ``predictor, repeat, fold, trajectory,
+            participant, condition, layout, candidates, goal, fraction, states, probability`` (of the true goal),
+            ``correct`` (0 to 1, ties shared out), ``confidence`` (probability of the top goal).
+        confusion: ``predictor, repeat, fold`` (and what was judged apart), ``fraction, goal, predicted, count``; a
+            prediction tied between ``k`` goals counts 1/k for each.
+        cut: What "fraction observed" is a fraction of.
+        ties: How ties count.
+        candidate_set: Which goals count as possible.
+        cv: Folds.
+        repeats: Repeats.
+        groups: What was kept together in splits.
+        by: What was learned and judged apart.
+    """
+
+    table: pd.DataFrame = field(repr=False)
+    confusion: pd.DataFrame = field(repr=False)
+    cut: str
+    ties: str
+    candidate_set: str
+    cv: int
+    repeats: int
+    groups: str | None = None
+    by: str | None = None
+
+    def __post_init__(self) -> None:
+        for table in (self.table, self.confusion):
+            self._describe(table)
+
+    @property
+    def definition(self) -> str:
+        """What the figures mean, in a sentence; to be printed beside them."""
+        grouped = ", no participant on both sides" if self.groups else ""
+        return (
+            f"{self.cv}-fold stratified cross-validation x {self.repeats}{grouped}; fraction f observed means "
+            f"{CUTS[self.cut]} (cut {self.cut!r}); ties {self.ties}; candidate set {self.candidate_set!r}"
+        )
+
+    @property
+    def predictors(self) -> list[str]:
+        """Names of the predictors, in the order given."""
+        return list(dict.fromkeys(self.table["predictor"]))
+
+    @property
+    def fractions(self) -> list[float]:
+        """Fractions observed, rising."""
+        return sorted(self.table["fraction"].unique().tolist())
+
+    @property
+    def keys(self) -> list[str]:
+        """Columns that tell results apart: ``predictor``, and what was judged apart."""
+        return ["predictor", *([self.by] if self.by else [])]
+
+    def accuracy(self, *, level: float = 0.95, unit: str | None = None) -> pd.DataFrame:
+        """Accuracy against fraction observed, with confidence bands.
+
+        Repeats are averaged within each trajectory first: they are not more data.
+
+        Args:
+            level: Of the confidence intervals.
+            unit: What counts as independent: ``"participant"`` (cluster-robust) or ``"trajectory"``. None takes
+                participants if all are named.
+
+        Returns:
+            ``predictor`` (and what was judged apart), ``fraction, accuracy, low, high, chance, trajectories, units``,
+            with ``unit`` and ``level`` in ``.attrs``.
+
+        Raises:
+            ValueError: An unknown unit, participants without names, or a level outside (0, 1).
+        """
+        import pandas as pd
+
+        named = not (self.table["participant"] == "").any()
+        unit = ("participant" if named else "trajectory") if unit is None else unit
+        if unit not in ("participant", "trajectory"):
+            raise ValueError(f"`unit` must be 'participant' or 'trajectory', got {unit!r}")
+        if unit == "participant" and not named:
+            raise ValueError("some trajectories name no participant; use unit='trajectory'")
+        if not 0 < level < 1:
+            raise ValueError(f"`level` must be between 0 and 1, got {level!r}")
+        rows = []
+        for labels, part in self._per_trajectory().groupby([*self.keys, "fraction"], sort=False):
+            units, names = pd.factorize(part[unit])
+            mean, low, high = clustered_interval(part["correct"].to_numpy(), units, level)
+            rows.append((*labels, mean, low, high, (1 / part["candidates"]).mean(), len(part), len(names)))
+        columns = [*self.keys, "fraction", "accuracy", "low", "high", "chance", "trajectories", "units"]
+        table = self._describe(pd.DataFrame(rows, columns=columns))
+        table.attrs.update(unit=unit, level=level)
+        return table
+
+    def metrics(self) -> pd.DataFrame:
+        """All figures of merit against fraction observed.
+
+        Returns:
+            ``predictor`` (and what was judged apart), ``fraction, accuracy, precision, recall, f1`` (weighted by goal),
+            ``log_loss, calibration_error``; each is the mean over repeats.
+        """
+        import pandas as pd
+
+        keys = [*self.keys, "fraction"]
+        confusions = dict(list(self.confusion.groupby([*keys, "repeat"], sort=False)))
+        rows = []
+        for labels, part in self.table.groupby([*keys, "repeat"], sort=False):
+            scores = {"accuracy": part["correct"].mean()}
+            goals = sorted({*part["goal"], *confusions[labels]["predicted"]} if labels in confusions else part["goal"])
+            matrix = _square(confusions.get(labels), goals)
+            counts = part["goal"].value_counts()
+            support = np.array([counts.get(goal, 0) for goal in goals], dtype=np.float64)
+            scores |= weighted_scores(matrix, support)
+            scores["log_loss"] = log_loss(part["probability"].to_numpy())
+            scores["calibration_error"] = calibration_error(part["confidence"].to_numpy(), part["correct"].to_numpy())
+            rows.append(dict(zip([*keys, "repeat"], labels, strict=True)) | scores)
+        means = pd.DataFrame(rows).drop(columns="repeat").groupby(keys, sort=False, as_index=False).mean()
+        return self._describe(means)
+
+    def summary(self) -> pd.DataFrame:
+        """A row per predictor (and what was judged apart): the means of :meth:`metrics` over fractions."""
+        means = self.metrics().drop(columns="fraction").groupby(self.keys, sort=False, as_index=False).mean()
+        counts = self.table.groupby(self.keys, sort=False, as_index=False).agg(
+            trajectories=("trajectory", "nunique"), participants=("participant", "nunique")
+        )
+        return self._describe(means.merge(counts, on=self.keys))
+
+    def confusion_matrix(
+        self, predictor: str | None = None, *, fraction: float | None = None, normalise: bool = False, **part: str
+    ) -> pd.DataFrame:
+        """Which goals are taken for which.
+
+        Args:
+            predictor: Whose; may be left out if there is one.
+            fraction: At which fraction; None averages over all.
+            normalise: Rows as shares rather than trajectories.
+            part: ``condition=`` or ``layout=``, if these were judged apart.
+
+        Returns:
+            Rows are true goals, columns predicted ones, in trajectories (repeats averaged).
+
+        Raises:
+            ValueError: Nothing of that name or fraction.
+        """
+        import pandas as pd
+
+        chosen = self.confusion
+        if predictor is None and len(self.predictors) > 1:
+            raise ValueError(f"say whose confusion matrix: one of {self.predictors}")
+        wanted = {"predictor": predictor or self.predictors[0], **part}
+        for column, value in wanted.items():
+            if column not in self.keys or value not in set(chosen[column]):
+                raise ValueError(f"nothing was judged with {column} = {value!r}")
+            chosen = chosen[chosen[column] == value]
+        if fraction is not None:
+            chosen = chosen[np.isclose(chosen["fraction"], fraction)]
+            if chosen.empty:
+                raise ValueError(f"fraction {fraction!r} was not observed; choose from {self.fractions}")
+        goals = sorted({*chosen["goal"], *chosen["predicted"]})
+        matrix = _square(chosen, goals) / (self.repeats * chosen["fraction"].nunique())
+        if normalise:
+            total = matrix.sum(axis=1, keepdims=True)
+            matrix = np.divide(matrix, total, out=np.zeros_like(matrix), where=total > 0)
+        frame = pd.DataFrame(matrix, index=pd.Index(goals, name="goal"), columns=pd.Index(goals, name="predicted"))
+        return self._describe(frame)
+
+    def _per_trajectory(self) -> pd.DataFrame:
+        keep = dict.fromkeys([*self.keys, "trajectory", "participant", "candidates", "fraction"])
+        return self.table.groupby(list(keep), sort=False)["correct"].mean().reset_index()
+
+    def _describe(self, table: pd.DataFrame) -> pd.DataFrame:
+        table.attrs.update(
+            cut=self.cut,
+            definition=CUTS[self.cut],
+            ties=self.ties,
+            candidate_set=self.candidate_set,
+            evaluation=self.definition,
+        )
+        return table
+
+
+def _square(confusion: Any, goals: Sequence[str]) -> Any:
+    """``(K, K)`` counts of a tidy confusion table; zeros for None."""
+    matrix = np.zeros((len(goals), len(goals)))
+    if confusion is not None:
+        place = {goal: i for i, goal in enumerate(goals)}
+        rows, columns = ([place[name] for name in confusion[which]] for which in ("goal", "predicted"))
+        np.add.at(matrix, (rows, columns), confusion["count"].to_numpy())
+    return matrix
+
+
+@dataclass(frozen=True, eq=False)
+class LearningCurve:
+    """What :func:`predictors.evaluation.learning_curve` found.
+
+    Attributes:
+        table: ``predictor, repeat, size`` (trajectories learned from), ``judged`` (trajectories held out), ``fraction,
+            accuracy``.
+        cut: What "fraction observed" is a fraction of.
+        ties: How ties count.
+        candidate_set: Which goals count as possible.
+        test_share: Share held out.
+    """
+
+    table: pd.DataFrame = field(repr=False)
+    cut: str
+    ties: str
+    candidate_set: str
+    test_share: float
+
+    @property
+    def definition(self) -> str:
+        """What the figures mean, in a sentence."""
+        return (
+            f"nested training sets, {self.test_share:.0%} held out anew in each repeat; fraction f observed means "
+            f"{CUTS[self.cut]} (cut {self.cut!r}); ties {self.ties}; candidate set {self.candidate_set!r}"
+        )
+
+    def summary(self) -> pd.DataFrame:
+        """``predictor, size, accuracy, low, high, repeats``: the mean over fractions, and one standard deviation.
+
+        The band shows how much results vary between splits; it is no confidence interval, as splits overlap.
+        """
+        each = self.table.groupby(["predictor", "size", "repeat"], sort=False, as_index=False)["accuracy"].mean()
+        grouped = each.groupby(["predictor", "size"], sort=False)["accuracy"]
+        table = grouped.agg(accuracy="mean", sd="std", repeats="count").reset_index()
+        sd = table.pop("sd").fillna(0.0)
+        table.insert(3, "low", (table["accuracy"] - sd).clip(0, 1))
+        table.insert(4, "high", (table["accuracy"] + sd).clip(0, 1))
+        table.attrs.update(cut=self.cut, definition=CUTS[self.cut], evaluation=self.definition)
+        return table

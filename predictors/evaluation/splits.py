@@ -1,0 +1,164 @@
+"""Which trajectories are learned from and which are judged."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from legible_envs.rollouts.trajectory import Trajectory
+
+__all__ = ["Groups", "check_learnable", "folds", "nested_training_sets"]
+
+Groups = Literal["participant"]
+Split = tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]
+
+
+def folds(
+    walks: Sequence[Trajectory],
+    cv: int,
+    rng: np.random.Generator,
+    *,
+    groups: Groups | None = None,
+    rare: Literal["error", "keep"] = "error",
+) -> Iterator[Split]:
+    """Training and test numbers of a stratified k-fold split.
+
+    Args:
+        walks: ``n`` trajectories with known goals.
+        cv: Number of folds ``k``.
+        rng: Where the shuffle comes from.
+        groups: ``"participant"`` keeps all trajectories of a person in one fold.
+        rare: Whether goals with fewer examples than folds are refused or kept; kept ones are absent from some folds,
+            and a goal's only example is judged without one to learn from.
+
+    Yields:
+        ``k`` pairs of numbers into ``walks``, sorted.
+
+    Raises:
+        ValueError: Too few trajectories, goals or participants; see above.
+    """
+    from sklearn.model_selection import StratifiedGroupKFold, StratifiedKFold
+
+    goals = check_learnable(walks)
+    if isinstance(cv, bool) or not isinstance(cv, int | np.integer) or cv < 2:
+        raise ValueError(f"`cv` must be a number of folds >= 2, got {cv!r}")
+    if len(walks) < cv:
+        raise ValueError(f"{cv} folds need at least {cv} trajectories, got {len(walks)}")
+    if rare not in ("error", "keep"):
+        raise ValueError(f"`rare` must be 'error' or 'keep', got {rare!r}")
+    few = {goal: count for goal, count in sorted(Counter(goals).items()) if count < cv}
+    if few and rare == "error":
+        raise ValueError(
+            f"goals with fewer examples than the {cv} folds: {few}; use fewer folds, leave these trajectories out, or "
+            "keep them with rare='keep'"
+        )
+    seed = int(rng.integers(2**31))
+    people: list[str] | None = None
+    if groups is None:
+        if min(len(walks), max(Counter(goals).values())) < cv:
+            raise ValueError(f"no goal has an example for each of the {cv} folds; use fewer folds")
+        splitter: Any = StratifiedKFold(cv, shuffle=True, random_state=seed)
+    elif groups == "participant":
+        people = [walk.participant for walk in walks]
+        if "" in people:
+            raise ValueError(f"trajectory {people.index('')} names no participant to group by; use groups=None")
+        if len(set(people)) < cv:
+            raise ValueError(f"{cv} folds need at least {cv} participants, got {len(set(people))}")
+        splitter = StratifiedGroupKFold(cv, shuffle=True, random_state=seed)
+    else:
+        raise ValueError(f"`groups` must be 'participant' or None, got {groups!r}")
+    for train, test in _quietly(splitter, goals, people):
+        _check_fold([walks[i] for i in train], [walks[i] for i in test])
+        yield train, test
+
+
+def _quietly(splitter: Any, goals: Sequence[str], people: Sequence[str] | None) -> list[Split]:
+    """The splits, without scikit-learn's warning about rare goals that were asked for."""
+    import warnings
+
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="The least populated class")
+        return [(np.sort(a), np.sort(b)) for a, b in splitter.split(np.zeros(len(goals)), list(goals), people)]
+
+
+def check_learnable(walks: Sequence[Trajectory]) -> list[str]:
+    """The goals of trajectories between which there is something to tell apart.
+
+    Raises:
+        TypeError: Something else than trajectories.
+        ValueError: None, prefixes, unknown goals, mixed candidate sets, or one goal only.
+    """
+    if not walks:
+        raise ValueError("no trajectories to evaluate on")
+    goals = []
+    for number, walk in enumerate(walks):
+        if not isinstance(walk, Trajectory):
+            raise TypeError(f"expected trajectories, got {type(walk).__name__} at index {number}")
+        if walk.goal is None:
+            raise ValueError(f"trajectory {number} has no known goal to judge by")
+        if not walk.complete:
+            raise ValueError(f"trajectory {number} is a prefix; give complete trajectories")
+        goals.append(walk.goal)
+    sets = sorted({walk.candidate_set for walk in walks})
+    if len(sets) > 1:
+        raise ValueError(f"trajectories with different candidate sets {sets} must be judged apart")
+    if len(set(goals)) == 1:
+        raise ValueError(f"all {len(goals)} trajectories go to {goals[0]!r}; there is nothing to tell apart")
+    return goals
+
+
+def _check_fold(train: Sequence[Trajectory], test: Sequence[Trajectory]) -> None:
+    goals = {walk.goal for walk in train}
+    if not test or len(goals) < 2:
+        what = "is empty" if not test else f"leaves only goal {goals.pop()!r} to learn from"
+        raise ValueError(f"a fold {what}; use fewer folds, or other groups")
+    unknown = {name for walk in test for name in walk.candidates} - {name for walk in train for name in walk.candidates}
+    if unknown:
+        raise ValueError(
+            f"goals {sorted(unknown)} are candidates only in the held-out part of a fold; use fewer folds, other "
+            "groups, or judge layouts apart with by='layout'"
+        )
+
+
+def nested_training_sets(
+    walks: Sequence[Trajectory],
+    test_share: float,
+    rng: np.random.Generator,
+    groups: Groups | None = None,
+) -> Split:
+    """A test set of a fixed share, and the others in an order whose every beginning holds goals in proportion.
+
+    Returns:
+        ``(pool, test)``: learning from the first ``m`` of ``pool`` gives nested training sets.
+
+    Raises:
+        ValueError: A share outside (0, 1), or a test set or pool of one goal.
+    """
+    from sklearn.model_selection import GroupShuffleSplit
+
+    goals = np.array(check_learnable(walks))
+    if not 0 < test_share < 1:
+        raise ValueError(f"`test_share` must be between 0 and 1, got {test_share!r}")
+    order = rng.permutation(len(walks))
+    if groups is None:
+        place = np.empty(len(walks))
+        for goal in np.unique(goals):
+            mine = order[goals[order] == goal]
+            place[mine] = (np.arange(len(mine)) + rng.uniform()) / len(mine)
+        count = min(max(round(test_share * len(walks)), 1), len(walks) - 1)
+        order = order[np.argsort(place[order], kind="stable")]
+        test, pool = np.sort(order[:count]), order[count:]
+    elif groups == "participant":
+        people = [walk.participant for walk in walks]
+        if len(set(people)) < 2:
+            raise ValueError("grouping by participant needs at least two participants")
+        split = GroupShuffleSplit(1, test_size=test_share, random_state=int(rng.integers(2**31)))
+        train, test = next(split.split(np.zeros(len(walks)), groups=people))
+        pool = order[np.isin(order, train)]
+    else:
+        raise ValueError(f"`groups` must be 'participant' or None, got {groups!r}")
+    return pool, test

@@ -1,0 +1,164 @@
+"""The goals of the most similar prefixes seen: a baseline that knows nothing about how people walk."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from legible_envs.rollouts.trajectory import Trajectory
+from predictors.grid.nearest_kernels import votes_of_nearest
+from predictors.grid.prefixes import PrefixEncoder, PrefixPredictor, Steps, distinct_prefixes
+
+__all__ = ["GridLogistic", "GridNGram", "GridNeighbours"]
+
+
+class GridNeighbours(PrefixPredictor):
+    """Shares of goals among the ``k`` nearest prefixes.
+
+    Prefixes are compared by the Euclidean distance of their features (see
+    :class:`~predictors.grid.prefixes.PrefixEncoder`). All that are as near as the ``k``-th count, so the answer does
+    not depend on the order of the walks; the prior counts as one more neighbour.
+
+    Args:
+        k: Number of neighbours; all prefixes of one walk together count as one.
+
+    Attributes:
+        classes_: ``(K,)`` names of all goals and candidates seen in ``fit``, sorted.
+    """
+
+    def __init__(self, k: int = 15) -> None:
+        self.k = k
+
+    def _check_parameters(self) -> None:
+        if isinstance(self.k, bool) or not isinstance(self.k, int) or self.k < 1:
+            raise ValueError(f"`k` must be an integer >= 1, got {self.k!r}")
+
+    def _learn(self, walks: Sequence[Trajectory]) -> None:
+        self._encoder = PrefixEncoder(walks, self.classes_)
+        features, weights = distinct_prefixes(walks, self._encoder, self.classes_)
+        self._columns_first, self._weights = np.ascontiguousarray(features.T), weights
+        self._squares = (features**2).sum(axis=1)
+        self._sizes = weights.sum(axis=1)
+        self._fallback = self._prior.of(self.classes_.tolist())
+
+    def _read(self, walk: Trajectory, cells: Steps) -> npt.NDArray[np.float64]:
+        query = self._encoder.encode(walk, cells)
+        there = np.flatnonzero(query)  # a dozen features of hundreds
+        found = votes_of_nearest(
+            there, query[there], self._columns_first, self._squares, self._weights, self._sizes, float(self.k)
+        )
+        return found + self._fallback
+
+
+class GridNGram(PrefixPredictor):
+    """Shares of goals among walks with the same last ``n`` steps, smoothed by those with fewer steps the same.
+
+    The start station comes before the first cell. The shares after ``m`` common steps are those of the walks counted,
+    plus ``strength`` walks distributed as after ``m - 1``; after none, the prior (Dirichlet smoothing; MacKay and Peto,
+    *A hierarchical Dirichlet language model*, 1995).
+
+    Args:
+        n: Steps of the longest context.
+        strength: Weight of the shorter context, in walks.
+
+    Attributes:
+        classes_: ``(K,)`` names of all goals and candidates seen in ``fit``, sorted.
+    """
+
+    def __init__(self, n: int = 4, strength: float = 2.0) -> None:
+        self.n = n
+        self.strength = strength
+
+    def _check_parameters(self) -> None:
+        if isinstance(self.n, bool) or not isinstance(self.n, int) or self.n < 1:
+            raise ValueError(f"`n` must be an integer >= 1, got {self.n!r}")
+        if not isinstance(self.strength, int | float) or not 0 < self.strength < np.inf:
+            raise ValueError(f"`strength` must be a finite number above 0, got {self.strength!r}")
+
+    def _contexts(self, walk: Trajectory, cells: Steps) -> Iterator[tuple[object, ...]]:
+        """The last 1, 2, … n steps."""
+        steps = (walk.start, *cells)
+        place = self._places.get(walk.layout, -1)
+        for count in range(1, min(self.n, len(steps)) + 1):
+            yield (place, *steps[-count:])
+
+    def _learn(self, walks: Sequence[Trajectory]) -> None:
+        column = {name: number for number, name in enumerate(self.classes_.tolist())}
+        self._counts: dict[tuple[object, ...], npt.NDArray[np.float64]] = {}
+        layouts = dict.fromkeys(walk.layout for walk in walks)
+        self._places = {layout: number for number, layout in enumerate(layouts)}
+        for walk in walks:
+            cells: Steps = tuple(map(tuple, walk.states[:-1].tolist()))
+            for end in range(1, len(cells) + 1):
+                for context in self._contexts(walk, cells[:end]):
+                    counts = self._counts.setdefault(context, np.zeros(len(column)))
+                    counts[column[walk.goal or ""]] += 1.0
+        self._fallback = self._prior.of(self.classes_.tolist())
+
+    def _read(self, walk: Trajectory, cells: Steps) -> npt.NDArray[np.float64]:
+        shares = self._fallback
+        for context in self._contexts(walk, cells):
+            counts = self._counts.get(context)
+            if counts is None:  # longer ones were not seen either
+                break
+            shares = (counts + self.strength * shares) / (counts.sum() + self.strength)
+        return shares
+
+
+class GridLogistic(PrefixPredictor):
+    """Logistic regression from a prefix to the goal.
+
+    Features are those of :class:`~predictors.grid.prefixes.PrefixEncoder`; every prefix of every walk is an example,
+    those of one walk weigh 1 together. Answers are shrunk toward the prior as if each goal had been seen once more.
+
+    Args:
+        C: Inverse strength of the L2 penalty.
+        max_iter: Most iterations.
+
+    Attributes:
+        classes_: ``(K,)`` names of all goals and candidates seen in ``fit``, sorted.
+        coef_: ``(K, width)`` weights; those of goals never chosen are zero.
+        intercept_: ``(K,)``, ``-inf`` for goals never chosen.
+    """
+
+    coef_: npt.NDArray[np.float64]
+    intercept_: npt.NDArray[np.float64]
+
+    def __init__(self, C: float = 1.0, max_iter: int = 300) -> None:
+        self.C = C
+        self.max_iter = max_iter
+
+    def _check_parameters(self) -> None:
+        for name in ("C", "max_iter"):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < np.inf:
+                raise ValueError(f"`{name}` must be a finite number above 0, got {value!r}")
+
+    def _learn(self, walks: Sequence[Trajectory]) -> None:
+        from sklearn.linear_model import LogisticRegression
+
+        self._encoder = PrefixEncoder(walks, self.classes_)
+        features, weights = distinct_prefixes(walks, self._encoder, self.classes_)
+        count = len(self.classes_)
+        self.coef_ = np.zeros((count, self._encoder.width))
+        self.intercept_ = np.full(count, -np.inf)
+        rows, goals = np.nonzero(weights)
+        seen = np.unique(goals)
+        self._trust = len(walks) / (len(walks) + count)
+        self._fallback = self._prior.of(self.classes_.tolist())
+        if len(seen) == 1:
+            self.intercept_[seen] = 0.0
+            return
+        model = LogisticRegression(C=self.C, max_iter=int(self.max_iter))
+        model.fit(features[rows], goals, sample_weight=weights[rows, goals])
+        coef, intercept = model.coef_, model.intercept_
+        if len(seen) == 2:  # scikit-learn keeps one row for two classes
+            coef, intercept = np.vstack([-coef, coef]) / 2, np.concatenate([-intercept, intercept]) / 2
+        self.coef_[seen], self.intercept_[seen] = coef, intercept
+
+    def _read(self, walk: Trajectory, cells: Steps) -> npt.NDArray[np.float64]:
+        scores = self.coef_ @ self._encoder.encode(walk, cells) + self.intercept_
+        weights = np.exp(scores - scores.max())
+        return self._trust * weights / weights.sum() + (1 - self._trust) * self._fallback

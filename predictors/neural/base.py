@@ -1,0 +1,364 @@
+"""What all neural predictors share: fitting, beliefs after every prefix, watching one person, and files."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import os
+import zipfile
+from abc import abstractmethod
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, ClassVar, Final, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from legible_envs.rollouts.trajectory import Cut, Trajectory
+from legible_envs.support.files import write_npz
+from predictors.base import FRACTIONS, GoalPredictor, GoalStream
+from predictors.grid.base import check_walk
+from predictors.neural.encoding import Encoding
+from predictors.neural.networks import NUMPY, Network, Weights, softmax
+from predictors.neural.training import Examples, Training, require_torch, train
+
+__all__ = ["SCHEMA", "NeuralPredictor", "NeuralStream"]
+
+SCHEMA: Final = 1
+"""Version of the files that :meth:`NeuralPredictor.save` writes."""
+
+_KIND: Final = "legible-envs neural predictor"
+_AT_ONCE: Final = 512
+
+
+class NeuralPredictor(GoalPredictor):
+    """Base class of predictors that learn with an ensemble of causal networks.
+
+    Subclasses take the parameters below and their network's own, and define ``_network``. Theirs may come first and
+    the rest as ``**training``: the signature that users and scikit-learn see names them all.
+
+    Args:
+        members: Networks in the ensemble.
+        learning_rate: Of AdamW.
+        weight_decay: Of AdamW.
+        dropout: Share of each layer's outputs set to zero while training.
+        batch_size: Trajectories per step.
+        max_epochs: Most passes over the data.
+        patience: Passes without a better held-out loss after which a member is done.
+        validation_fraction: Share each member holds out; 0 holds out nothing (as where that would be less than two).
+        device: ``"auto"`` (a GPU if there is one), ``"cpu"``, ``"cuda"``, ….
+        random_state: Seed.
+
+    Attributes:
+        classes_: ``(K,)`` names of all goals and candidates seen in ``fit``, sorted.
+        prior_: ``(K,)`` how often each goal was chosen when it was a candidate, one choice of each added.
+        validation_loss_: ``(epochs, members)`` negative log-likelihood per prefix of what each member did not train on.
+        weights_: The networks' weights by name, first axis the member.
+        encoding_: How trajectories become inputs.
+    """
+
+    _name: ClassVar[str]
+    _sizes: ClassVar[tuple[str, ...]]
+
+    prior_: npt.NDArray[np.float64]
+    validation_loss_: npt.NDArray[np.float64]
+    weights_: Weights
+    encoding_: Encoding
+
+    def __init__(
+        self,
+        *,
+        members: int = 4,
+        learning_rate: float = 0.01,
+        weight_decay: float = 0.01,
+        dropout: float = 0.2,
+        batch_size: int = 64,
+        max_epochs: int = 100,
+        patience: int = 8,
+        validation_fraction: float = 0.2,
+        device: str = "auto",
+        random_state: int = 0,
+    ) -> None:
+        self.members = members
+        self.learning_rate = learning_rate
+        self.weight_decay = weight_decay
+        self.dropout = dropout
+        self.batch_size = batch_size
+        self.max_epochs = max_epochs
+        self.patience = patience
+        self.validation_fraction = validation_fraction
+        self.device = device
+        self.random_state = random_state
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Name the shared parameters in the subclass's signature, from which scikit-learn takes what to clone."""
+        super().__init_subclass__(**options)
+        own = inspect.signature(cls.__init__)
+        named = [each for each in own.parameters.values() if each.kind is not inspect.Parameter.VAR_KEYWORD]
+        if len(named) < len(own.parameters):
+            shared = inspect.signature(NeuralPredictor.__init__).parameters.values()
+            named += [each for each in shared if each.name not in own.parameters]
+            cls.__init__.__signature__ = own.replace(parameters=named)  # type: ignore[attr-defined]
+
+    @abstractmethod
+    def _network(self) -> Network:
+        """The kind of network, from the parameters."""
+
+    def fit(self, X: Sequence[Trajectory], y: object = None) -> Self:
+        """Learn from trajectories with known goals, every prefix of each.
+
+        Args:
+            X: Trajectories of one kind: all cells, or all positions of one dimension.
+            y: Ignored; goals are part of the trajectories.
+
+        Raises:
+            ImportError: torch is not installed.
+            ValueError: A parameter out of range, no trajectories, a goal that is not known, or mixed kinds.
+        """
+        settings = self._settings()
+        network = self._network()
+        walks = self._check_trajectories(X)
+        super().fit(walks)
+        self.goal_columns(walks)
+        encoding = Encoding.learn(walks)
+        self._check_walks(walks)
+        require_torch()
+        self.prior_ = self._learn_prior(walks)
+        rng = np.random.default_rng(self.random_state)
+        weights = network.initial_weights(self.members, encoding.width, len(self.classes_), rng)
+        weights["out_bias"] = weights["out_bias"] + np.log(self.prior_)
+        examples = self._examples([walk for walk in walks if walk.num_states], encoding)
+        self.weights_, self.validation_loss_ = train(network, weights, examples, settings, rng)
+        self.encoding_ = encoding
+        return self
+
+    def predict_proba(self, X: Sequence[Trajectory]) -> npt.NDArray[np.float64]:
+        """See :meth:`GoalPredictor.predict_proba`; nothing observed is ``prior_`` among the candidates."""
+        walks = self._check_trajectories(X)
+        rows = [beliefs[-1] for beliefs in self._beliefs(walks)]
+        return np.array(rows, dtype=np.float64).reshape(len(walks), len(self.classes_))
+
+    def predict_proba_at(
+        self, X: Sequence[Trajectory], fractions: Sequence[float] = FRACTIONS, cut: Cut = "steps"
+    ) -> npt.NDArray[np.float64]:
+        """See :meth:`GoalPredictor.predict_proba_at`; each trajectory is read once, as the networks are causal."""
+        walks = self._check_trajectories(X)
+        lengths = [[walk.prefix_length(fraction, cut) for fraction in fractions] for walk in walks]
+        read = self._beliefs([walk.first(max(row, default=0)) for walk, row in zip(walks, lengths, strict=True)])
+        rows = [beliefs[row] for beliefs, row in zip(read, lengths, strict=True)]
+        return np.array(rows, dtype=np.float64).reshape(len(walks), len(fractions), len(self.classes_))
+
+    def stream(self, context: Trajectory) -> NeuralStream:
+        """Watch one person as they move, keeping what the networks remember; see :meth:`GoalPredictor.stream`."""
+        return NeuralStream(self, context)
+
+    # -- files --------------------------------------------------------------------------------------------------------
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the fitted predictor to one ``.npz`` of plain arrays and JSON, all or nothing; no pickles.
+
+        Returns:
+            The path written.
+
+        Raises:
+            NotFittedError: Before ``fit``.
+            OSError: The file cannot be written; what was there before is untouched.
+        """
+        self._check_fitted()
+        config = {
+            "predictor": self._name,
+            "parameters": self.get_params(),
+            "classes": self.classes_.tolist(),
+            "encoding": self.encoding_.to_config(),
+        }
+        arrays: dict[str, Any] = {f"weights/{name}": value for name, value in self.weights_.items()}
+        arrays |= {"prior": self.prior_, "validation_loss": self.validation_loss_}
+        text = np.frombuffer(json.dumps(config).encode("ascii"), dtype=np.uint8)
+        write_npz(path, {"kind": _KIND, "schema": SCHEMA, "config": text, **arrays})
+        return Path(path)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Self:
+        """Read a predictor back; needs no torch, and runs nothing that is in the file.
+
+        Raises:
+            FileNotFoundError: No such file.
+            ValueError: Not a file of a predictor of this class, damaged, or of a newer schema.
+        """
+        name = os.fspath(path)
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                if not isinstance(file, np.lib.npyio.NpzFile) or "kind" not in file or str(file["kind"]) != _KIND:
+                    raise ValueError("it is not a file of a neural predictor")
+                if int(file["schema"]) > SCHEMA:
+                    raise ValueError(f"it has schema {int(file['schema'])}; this version reads up to {SCHEMA}")
+                arrays = {key: file[key] for key in file.files if key not in ("kind", "schema")}
+            return cls._rebuild(arrays)
+        except FileNotFoundError:
+            raise
+        except (OSError, EOFError, KeyError, ValueError, TypeError, AttributeError, zipfile.BadZipFile) as error:
+            raise ValueError(f"cannot read a {cls.__name__} from {name}: {error}") from error
+
+    @classmethod
+    def _rebuild(cls, arrays: dict[str, npt.NDArray[Any]]) -> Self:
+        config = json.loads(arrays.pop("config").tobytes().decode("ascii"))
+        if config["predictor"] != cls._name:
+            raise ValueError(f"it holds a {config['predictor']!r} predictor, not {cls._name!r}")
+        predictor = cls(**config["parameters"])
+        predictor._settings()
+        predictor.classes_ = np.array(config["classes"])
+        predictor.encoding_ = Encoding.from_config(config["encoding"])
+        predictor.prior_ = arrays.pop("prior")
+        predictor.validation_loss_ = arrays.pop("validation_loss")
+        weights = {key.removeprefix("weights/"): value for key, value in arrays.items()}
+        expected = predictor._network().initial_weights(
+            predictor.members, predictor.encoding_.width, len(predictor.classes_), np.random.default_rng(0)
+        )
+        shapes = {key: value.shape for key, value in weights.items()}
+        if shapes != {key: value.shape for key, value in expected.items()}:
+            raise ValueError("its weights do not fit its parameters")
+        if not all(np.isfinite(value).all() for value in weights.values()):
+            raise ValueError("its weights are not finite")
+        predictor.weights_ = weights
+        return predictor
+
+    # -- inside -------------------------------------------------------------------------------------------------------
+
+    def _settings(self) -> Training:
+        for name in (*self._sizes, "members", "batch_size", "max_epochs", "patience"):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+                raise ValueError(f"`{name}` must be a whole number >= 1, got {value!r}")
+        limits = {"learning_rate": 10.0, "weight_decay": 10.0, "dropout": 0.99, "validation_fraction": 0.5}
+        for name, most in limits.items():
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= most:
+                raise ValueError(f"`{name}` must be a number from 0 to {most:g}, got {value!r}")
+        if isinstance(self.random_state, bool) or not isinstance(self.random_state, int) or self.random_state < 0:
+            raise ValueError(f"`random_state` must be a whole number >= 0, got {self.random_state!r}")
+        return Training(
+            members=self.members,
+            learning_rate=self.learning_rate,
+            weight_decay=self.weight_decay,
+            dropout=self.dropout,
+            batch_size=self.batch_size,
+            max_epochs=self.max_epochs,
+            patience=self.patience,
+            validation_fraction=self.validation_fraction,
+            device=self.device,
+        )
+
+    def _check_fitted(self) -> None:
+        if not hasattr(self, "weights_"):
+            from sklearn.exceptions import NotFittedError
+
+            raise NotFittedError(f"this {type(self).__name__} is not fitted yet; call `fit` with trajectories first")
+
+    @staticmethod
+    def _check_walks(walks: Sequence[Trajectory]) -> None:
+        for walk in walks:
+            if walk.layout is not None and walk.is_grid:
+                check_walk(walk)
+
+    def _learn_prior(self, walks: Sequence[Trajectory]) -> npt.NDArray[np.float64]:
+        chosen = np.bincount(self.goal_columns(walks), minlength=len(self.classes_)) + 1.0
+        return chosen / (self._allowed(walks).sum(axis=0) + len(self.classes_))
+
+    def _allowed(self, walks: Sequence[Trajectory]) -> npt.NDArray[np.bool_]:
+        allowed = np.zeros((len(walks), len(self.classes_)), dtype=bool)
+        for row, walk in enumerate(walks):
+            allowed[row, self._columns(walk)] = True
+        return allowed
+
+    def _examples(self, walks: Sequence[Trajectory], encoding: Encoding) -> Examples:
+        return Examples(
+            inputs=_padded([encoding.encode(walk) for walk in walks]).astype(np.float32),
+            lengths=np.array([walk.num_states for walk in walks], dtype=np.intp),
+            allowed=self._allowed(walks),
+            goals=self.goal_columns(walks),
+        )
+
+    def _beliefs(self, walks: Sequence[Trajectory]) -> list[npt.NDArray[np.float64]]:
+        """For each trajectory ``(T+1, K)``: the belief after 0, 1, …, T states."""
+        self._check_fitted()
+        allowed = self._allowed(walks)
+        for walk in walks:
+            self.encoding_.check(walk)
+        self._check_walks(walks)
+        found: list[npt.NDArray[np.float64]] = [np.zeros(0)] * len(walks)
+        by_length = sorted(range(len(walks)), key=lambda i: walks[i].num_states)
+        network = self._network()
+        for begin in range(0, len(by_length), _AT_ONCE):
+            rows = by_length[begin : begin + _AT_ONCE]
+            inputs = _padded([self.encoding_.encode(walks[i]) for i in rows])
+            after = self._probabilities(network(NUMPY, self.weights_, inputs[None])[0], allowed[rows])
+            before = self._prior(allowed[rows])
+            for row, i in enumerate(rows):
+                found[i] = np.concatenate([before[row, None], after[row, : walks[i].num_states]])
+        return found
+
+    def _prior(self, allowed: npt.NDArray[np.bool_]) -> npt.NDArray[np.float64]:
+        weights = np.where(allowed, self.prior_, 0.0)
+        return weights / weights.sum(axis=1, keepdims=True)
+
+    def _probabilities(
+        self, logits: npt.NDArray[np.float64], allowed: npt.NDArray[np.bool_]
+    ) -> npt.NDArray[np.float64]:
+        """``(n, T, K)`` mean over the members' probabilities, given logits ``(M, n, T, K)``."""
+        probabilities = softmax(np.where(allowed[:, None], logits, -np.inf)).mean(axis=0)
+        return probabilities / probabilities.sum(axis=-1, keepdims=True)
+
+
+class NeuralStream(GoalStream):
+    """A neural predictor's belief about one person, which goes on from what the networks remember.
+
+    Each update runs the networks on one state: recurrent ones carry their hidden vectors, transformers their keys and
+    values.
+    """
+
+    def __init__(self, predictor: NeuralPredictor, context: Trajectory) -> None:
+        super().__init__(predictor, context)
+        predictor._check_fitted()
+        self._neural = predictor
+        self._network = predictor._network()
+        self._known = predictor.encoding_.context(context)
+        self._allowed = predictor._allowed([context])
+        self._state: Any = None
+        self._row = predictor._prior(self._allowed)[0]
+
+    @property
+    def belief(self) -> dict[str, float]:
+        """``{goal: probability}`` now; the prior before the first point."""
+        return dict(zip(self._context.candidates, self._row[self._columns].tolist(), strict=True))
+
+    def add(self, point: npt.ArrayLike, time: float | None = None) -> None:
+        """Add a state without asking for the belief; see :meth:`update`."""
+        count = len(self._points)
+        super().add(point, time)
+        if len(self._points) == count:
+            return
+        try:
+            self._advance()
+        except ValueError:  # a point that does not fit is not part of the way
+            del self._points[count:], self._times[count:]
+            raise
+
+    def _advance(self) -> None:
+        predictor = self._neural
+        recent = np.array([self._points[0], *self._points[-2:]])
+        if len(self._points) < 3:  # most checks are of the kind of points, and one kind is one kind
+            predictor.encoding_.check(self._observed())
+        if self._context.layout is not None and predictor.encoding_.grid:
+            check_walk(self._observed())
+        rows = predictor.encoding_.rows(self._known, recent[0], recent[-2:-1], recent[-1:])
+        logits, self._state = self._network(NUMPY, predictor.weights_, rows[None, None], self._state)
+        self._row = predictor._probabilities(logits, self._allowed)[0, 0]
+
+
+def _padded(arrays: Sequence[npt.NDArray[np.float64]]) -> npt.NDArray[np.float64]:
+    """``(n, T, D)`` with zeros after the end of shorter ones; ``T`` is at least 1."""
+    longest = max(max(len(array) for array in arrays), 1)
+    padded = np.zeros((len(arrays), longest, arrays[0].shape[1]))
+    for row, array in enumerate(arrays):
+        padded[row, : len(array)] = array
+    return padded

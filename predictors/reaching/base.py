@@ -1,0 +1,98 @@
+"""Where goals are, for reaches: told by the trajectory, or learned from where earlier reaches ended."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import Self
+
+import numpy as np
+import numpy.typing as npt
+
+from legible_envs.rollouts.trajectory import Trajectory
+from predictors.base import GoalPredictor
+
+__all__ = ["PlacePredictor", "goal_places", "learn_places", "straight_lines"]
+
+Places = Mapping[str, npt.NDArray[np.float64]]
+
+
+def learn_places(X: Sequence[Trajectory]) -> dict[str, npt.NDArray[np.float64]]:
+    """``(d,)`` mean last position of the complete reaches to each goal.
+
+    Raises:
+        ValueError: Reaches of different dimensions.
+    """
+    ends: dict[str, list[npt.NDArray[np.float64]]] = {}
+    for walk in X:
+        if walk.complete and walk.num_states and walk.goal is not None:
+            ends.setdefault(walk.goal, []).append(walk.states[-1].astype(np.float64))
+    dimensions = sorted({len(end) for found in ends.values() for end in found})
+    if len(dimensions) > 1:
+        raise ValueError(f"all reaches must have one dimension, got {dimensions}")
+    return {goal: np.mean(found, axis=0) for goal, found in ends.items()}
+
+
+def goal_places(walk: Trajectory, learned: Places) -> npt.NDArray[np.float64]:
+    """``(len(walk.candidates), d)`` where the candidates are.
+
+    Args:
+        walk: Its ``goal_positions`` count where it has them.
+        learned: What :func:`learn_places` found, for the others.
+
+    Raises:
+        ValueError: A candidate whose place nobody told and no reach ended at, or another dimension than the states'.
+    """
+    if walk.goal_positions is not None:
+        return np.array(walk.goal_positions)
+    missing = [goal for goal in walk.candidates if goal not in learned]
+    if missing:
+        raise ValueError(
+            f"unknown places of {missing}: the trajectory has no `goal_positions`, and no reach in `fit` ended there"
+        )
+    places = np.array([learned[goal] for goal in walk.candidates])
+    if walk.num_states and places.shape[1] != walk.states.shape[1]:
+        raise ValueError(f"expected states of dimension {places.shape[1]} as in `fit`, got {walk.states.shape[1]}")
+    return places
+
+
+def straight_lines(point: npt.NDArray[np.floating], places: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """``(n,)`` Euclidean distances from a point ``(d,)`` to places ``(n, d)``."""
+    return np.sqrt(((places - point) ** 2).sum(axis=1))
+
+
+class PlacePredictor(GoalPredictor):
+    """A predictor that knows where goals are and looks at one reach at a time.
+
+    Subclasses define ``weigh``.
+
+    Attributes:
+        classes_: ``(K,)`` names of all goals and candidates seen in ``fit``, sorted.
+        places_: ``(d,)`` place of each goal that reaches ended at in ``fit``.
+    """
+
+    def fit(self, X: Sequence[Trajectory], y: object = None) -> Self:
+        """Learn the goals' names and where reaches to them end; see :meth:`GoalPredictor.fit`."""
+        super().fit(X, y)
+        self.places_ = learn_places(X)
+        return self
+
+    @abstractmethod
+    def weigh(self, states: npt.NDArray[np.floating], places: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """``(n,)`` weights >= 0, not all 0, of goals at ``(n, d)`` places after ``(T, d)`` states, T >= 1."""
+
+    def weigh_walk(self, walk: Trajectory) -> npt.NDArray[np.float64]:
+        """``(n,)`` weights of a reach's candidates after at least one state; for subclasses that look at more."""
+        return self.weigh(walk.states, goal_places(walk, self.places_))
+
+    def predict_proba(self, X: Sequence[Trajectory]) -> npt.NDArray[np.float64]:
+        """See :meth:`GoalPredictor.predict_proba`."""
+        walks = self._check_trajectories(X)
+        columns = [self._columns(walk) for walk in walks]
+        probabilities = np.zeros((len(walks), len(self.classes_)))
+        for row, walk in enumerate(walks):
+            weights = np.ones(len(walk.candidates))
+            if walk.num_states:
+                weights = self.weigh_walk(walk)
+            probabilities[row, columns[row]] = weights / weights.sum()
+        return probabilities
