@@ -47,11 +47,13 @@ test: $(VENV)/.test-installed
 test-benchmarks: $(VENV)/.test-installed
 	$(BIN)/python -m pytest -m benchmark
 
-# make lint   style, formatting and types
+# make lint   style, formatting, spelling, types and import rules
 lint: $(VENV)/.test-installed
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/codespell
 	$(BIN)/mypy
+	$(BIN)/lint-imports --no-cache
 
 # make format   put the code into the project's style
 format: $(VENV)/.test-installed

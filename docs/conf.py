@@ -16,10 +16,10 @@ extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
-    "sphinx.ext.mathjax",
     "sphinx.ext.napoleon",
     "sphinx.ext.viewcode",
     "environment_pages",
+    "mathml",
 ]
 exclude_patterns = ["_build", "examples"]
 suppress_warnings = ["config.cache"]
@@ -36,6 +36,7 @@ napoleon_use_rtype = False
 napoleon_use_ivar = True
 napoleon_attr_annotations = False
 
+html_math_renderer = "mathml"
 html_theme = "furo"
 html_title = f"legible-envs {release}"
 html_static_path = ["_static"]

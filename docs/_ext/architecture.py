@@ -55,7 +55,9 @@ class Box:
 
 def floors() -> dict[str, list[list[str]]]:
     """Modules by container, a list per floor, the highest first; the container of the packages is ``""``."""
-    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]["contracts"]
+    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"][
+        "contracts"
+    ]
     found: dict[str, list[list[str]]] = {}
     for contract in contracts:
         if contract["type"] == "layers":
@@ -133,7 +135,12 @@ def rooms() -> str:
     lines: list[str] = []
     for row in house():
         for package in row:
-            lines += [f"**{package.name}**: {sentence(package.module)}", "", "| room | what is in it |", "| --- | --- |"]
+            lines += [
+                f"**{package.name}**: {sentence(package.module)}",
+                "",
+                "| room | what is in it |",
+                "| --- | --- |",
+            ]
             lines += [f"| `{path}` | {sentence(module)} |" for module, path in _rooms_in(package)]
             lines.append("")
     return "\n".join(lines)
