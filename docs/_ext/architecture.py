@@ -3,7 +3,7 @@
     python docs/_ext/architecture.py    # writes docs/images/architecture.svg and docs/_rooms.md
 
 What is drawn above may import what is drawn below: the floors are those of `[tool.importlinter]` in pyproject.toml, so
-that the picture cannot tell anything else than `make lint` enforces. The sentence of a room is the first of its docstring.
+that the picture tells what `make lint` enforces. The sentence of a room is the first of its docstring.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""An import-linter contract: modules of compiled kernels import arrays, the compiler and other kernels, nothing else."""
+"""An import-linter contract: modules of compiled kernels import arrays, the compiler and other kernels only."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ __all__ = ["KernelContract"]
 
 
 class KernelContract(Contract):
-    """Modules whose names match ``kernels`` import, of our packages, only modules that match ``kernels`` or ``allowed``.
+    """Modules that match ``kernels`` import, of our packages, only modules that match ``kernels`` or ``allowed``.
 
-    Names are patterns of :mod:`fnmatch`, so that ``*_kernels`` means every file that ends so. What numba compiles has to
-    stay plain data and arithmetic; an import of a shell is where that ends.
+    Names are patterns of :mod:`fnmatch`, so that ``*_kernels`` means every file that ends so. What numba compiles stays
+    plain data and arithmetic; an import of a shell is where that ends.
     """
 
     type_name = "kernels"
