@@ -1,0 +1,89 @@
+"""The shape of the house: imports form no cycle, follow the floors, and the picture shows the floors as they are."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import networkx as nx
+import pytest
+
+grimp = pytest.importorskip("grimp")
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("legible_envs", "optimizers", "predictors", "benchmarks")
+LAZY = {
+    ("legible_envs.tabletop.layout", "legible_envs.tabletop.geometry.paths"),
+    ("legible_envs.tabletop.design.workspace", "legible_envs.tabletop.design.differentiable"),
+}
+"""The two imports that close a cycle and stay: a method's convenience, imported when it is called."""
+
+
+@pytest.fixture(scope="module")
+def imports() -> list[tuple[str, str]]:
+    """All imports among the packages: at the top, in functions, and for types alone."""
+    graph = grimp.build_graph(*PACKAGES, cache_dir=None)
+    return [
+        (importer, imported)
+        for importer in graph.modules
+        for imported in graph.find_modules_directly_imported_by(importer)
+    ]
+
+
+def cycles(imports: list[tuple[str, str]]) -> list[list[str]]:
+    """Rooms of one folder that import one another in a circle, at any depth below any package."""
+    rooms = nx.DiGraph()
+    for importer, imported in imports:
+        ours, theirs = importer.split("."), imported.split(".")
+        shared = next((i for i, (a, b) in enumerate(zip(ours, theirs, strict=False)) if a != b), None)
+        if shared is not None:
+            rooms.add_edge(".".join(ours[: shared + 1]), ".".join(theirs[: shared + 1]))
+    return [sorted(found) for found in nx.strongly_connected_components(rooms) if len(found) > 1]
+
+
+def test_imports_form_no_cycle(imports):
+    assert cycles([pair for pair in imports if pair not in LAZY]) == []
+
+
+def test_the_two_lazy_imports_are_needed_and_lazy(imports):
+    assert set(imports) >= LAZY
+    for importer, imported in LAZY:
+        source = (ROOT / f"{importer.replace('.', '/')}.py").read_text(encoding="utf-8")
+        home, _, name = imported.rpartition(".")
+        at_the_top = [
+            line for line in source.splitlines() if line.startswith((f"from {imported} ", f"import {imported}"))
+        ]
+        assert at_the_top == []
+        assert f"from {home} import {name}\n" not in source.partition("\nclass ")[0]
+
+
+def test_a_cycle_would_be_found():
+    assert cycles([("p.a.x", "p.b"), ("p.b.y", "p.c"), ("p.c", "p.a.z")]) == [["p.a", "p.b", "p.c"]]
+    assert cycles([("p.a.x", "p.a.y"), ("p.a.y", "p.b"), ("q.a", "p.b")]) == []
+
+
+def architecture() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("architecture", ROOT / "docs/_ext/architecture.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_picture_and_the_table_of_rooms_are_current():
+    page = architecture()
+    again = "run `python docs/_ext/architecture.py`"
+    assert page.PICTURE.read_text(encoding="utf-8") == page.draw(), again
+    assert page.ROOMS.read_text(encoding="utf-8") == page.rooms(), again
+
+
+def test_every_room_says_in_a_sentence_what_is_in_it():
+    page = architecture()
+    for row in page.house():
+        for package in row:
+            for module, _ in page._rooms_in(package):
+                assert page.sentence(module).endswith((".", "?")), module
