@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import CUTS, Cut, Trajectory
-from predictors.base import FRACTIONS, GoalPredictor, Ties, correctness
+from predictors.base import FRACTIONS, GoalPredictor, TieCredit, correctness
 from predictors.evaluation.metrics import tied_shares
 from predictors.evaluation.results import Evaluation, LearningCurve
 from predictors.evaluation.splits import Groups, check_learnable, folds, nested_training_sets
@@ -39,7 +39,7 @@ def accuracy_at(
     fractions: Sequence[float] = FRACTIONS,
     *,
     cut: Cut = "steps",
-    ties: Ties = "fractional",
+    ties: TieCredit = "fractional",
 ) -> pd.DataFrame:
     """Judge a fitted predictor on trajectories it has not learned from.
 
@@ -58,45 +58,47 @@ def accuracy_at(
     Raises:
         ValueError: Prefixes, unknown goals, or mixed candidate sets, whose accuracies must not be averaged.
     """
-    walks = list(X)
-    sets = sorted({walk.candidate_set for walk in walks})
+    trajectories = list(X)
+    sets = sorted({trajectory.candidate_set for trajectory in trajectories})
     if len(sets) > 1:
         raise ValueError(f"trajectories with different candidate sets {sets} must be judged apart")
-    probabilities = predictor.predict_proba_at(walks, fractions, cut)
-    table = _rows(walks, probabilities, predictor.goal_columns(walks), fractions, cut, ties)
+    probabilities = predictor.predict_proba_at(trajectories, fractions, cut)
+    table = _rows(trajectories, probabilities, predictor.goal_columns(trajectories), fractions, cut, ties)
     table.attrs.update(cut=cut, definition=CUTS[cut], ties=ties, candidate_set=sets[0] if sets else None)
     return table
 
 
 def _rows(
-    walks: Sequence[Trajectory],
+    trajectories: Sequence[Trajectory],
     probabilities: npt.NDArray[np.float64],
     goals: npt.NDArray[np.intp],
     fractions: Sequence[float],
     cut: Cut,
-    ties: Ties,
+    ties: TieCredit,
 ) -> pd.DataFrame:
     import pandas as pd
 
-    number, count = len(walks), len(fractions)
+    number, count = len(trajectories), len(fractions)
     return pd.DataFrame(
         {
             "trajectory": np.repeat(np.arange(number), count),
-            "participant": np.repeat([walk.participant for walk in walks], count),
-            "condition": np.repeat([walk.condition for walk in walks], count),
-            "layout": np.repeat([_layout_label(walk) for walk in walks], count),
-            "candidates": np.repeat([len(walk.candidates) for walk in walks], count),
-            "goal": np.repeat([walk.goal or "" for walk in walks], count),
+            "participant": np.repeat([trajectory.participant for trajectory in trajectories], count),
+            "condition": np.repeat([trajectory.condition for trajectory in trajectories], count),
+            "layout": np.repeat([_layout_label(trajectory) for trajectory in trajectories], count),
+            "candidates": np.repeat([len(trajectory.candidates) for trajectory in trajectories], count),
+            "goal": np.repeat([trajectory.goal or "" for trajectory in trajectories], count),
             "fraction": np.tile(np.asarray(fractions, dtype=np.float64), number),
-            "states": [walk.prefix_length(fraction, cut) for walk in walks for fraction in fractions],
+            "states": [
+                trajectory.prefix_length(fraction, cut) for trajectory in trajectories for fraction in fractions
+            ],
             "probability": probabilities[np.arange(number)[:, None], np.arange(count), goals[:, None]].ravel(),
             "correct": correctness(probabilities, goals, ties).ravel(),
         }
     )
 
 
-def _layout_label(walk: Trajectory) -> str:
-    return walk.layout_name or (walk.layout.layout_id if walk.layout is not None else "")
+def _layout_label(trajectory: Trajectory) -> str:
+    return trajectory.layout_name or (trajectory.layout.layout_id if trajectory.layout is not None else "")
 
 
 # -- cross-validation -------------------------------------------------------------------------------------------------
@@ -110,7 +112,7 @@ def evaluate(
     repeats: int = 3,
     fractions: Sequence[float] = FRACTIONS,
     cut: Cut = "steps",
-    ties: Ties = "fractional",
+    ties: TieCredit = "fractional",
     groups: Groups | None = None,
     by: Part | None = None,
     rare: Literal["error", "keep"] = "error",
@@ -145,21 +147,21 @@ def evaluate(
     import pandas as pd
     from sklearn.base import clone
 
-    walks = list(X)
-    check_learnable(walks)
+    trajectories = list(X)
+    check_learnable(trajectories)
     _check_options(fractions, cut, repeats)
     named = _named(predictors)
-    parts = _parts(walks, by)
+    parts = _parts(trajectories, by)
     rng = np.random.default_rng(seed)
     tables, confusions = [], []
     for part, members in parts.items():
         for repeat in range(repeats):
             try:
-                splits = list(folds([walks[i] for i in members], cv, rng, groups=groups, rare=rare))
+                splits = list(folds([trajectories[i] for i in members], cv, rng, groups=groups, rare=rare))
             except ValueError as error:
                 raise ValueError(f"{by} {part!r}: {error}" if by else str(error)) from error
             for fold, (train, test) in enumerate(splits):
-                learned, judged = ([walks[members[i]] for i in half] for half in (train, test))
+                learned, judged = ([trajectories[members[i]] for i in half] for half in (train, test))
                 for name, predictor in named.items():
                     fitted = clone(predictor).fit(learned)
                     rows, confusion = _judge(fitted, judged, fractions, cut, ties)
@@ -172,7 +174,7 @@ def evaluate(
         confusion=pd.concat(confusions, ignore_index=True),
         cut=cut,
         ties=ties,
-        candidate_set=walks[0].candidate_set,
+        candidate_set=trajectories[0].candidate_set,
         cv=cv,
         repeats=repeats,
         groups=groups,
@@ -209,22 +211,27 @@ def _named(specs: Specs) -> dict[str, GoalPredictor]:
     return named
 
 
-def _parts(walks: Sequence[Trajectory], by: Part | None) -> dict[str, npt.NDArray[np.intp]]:
+def _parts(trajectories: Sequence[Trajectory], by: Part | None) -> dict[str, npt.NDArray[np.intp]]:
     if by not in (None, "condition", "layout"):
         raise ValueError(f"`by` must be 'condition', 'layout' or None, got {by!r}")
-    labels = np.array([walk.condition if by == "condition" else _layout_label(walk) if by else "" for walk in walks])
+    labels = np.array(
+        [
+            trajectory.condition if by == "condition" else _layout_label(trajectory) if by else ""
+            for trajectory in trajectories
+        ]
+    )
     return {str(label): np.flatnonzero(labels == label) for label in dict.fromkeys(labels.tolist())}
 
 
 def _judge(
-    predictor: GoalPredictor, walks: Sequence[Trajectory], fractions: Sequence[float], cut: Cut, ties: Ties
+    predictor: GoalPredictor, trajectories: Sequence[Trajectory], fractions: Sequence[float], cut: Cut, ties: TieCredit
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Rows as of :func:`accuracy_at` with ``confidence``, and confusions as ``fraction, goal, predicted, count``."""
     import pandas as pd
 
-    probabilities = predictor.predict_proba_at(walks, fractions, cut)
-    goals = predictor.goal_columns(walks)
-    rows = _rows(walks, probabilities, goals, fractions, cut, ties)
+    probabilities = predictor.predict_proba_at(trajectories, fractions, cut)
+    goals = predictor.goal_columns(trajectories)
+    rows = _rows(trajectories, probabilities, goals, fractions, cut, ties)
     rows["confidence"] = probabilities.max(axis=-1).ravel()
     names = np.asarray(predictor.classes_)
     counts = np.zeros((len(fractions), len(names), len(names)))
@@ -260,7 +267,7 @@ def learning_curve(
     repeats: int = 5,
     fractions: Sequence[float] = FRACTIONS,
     cut: Cut = "steps",
-    ties: Ties = "fractional",
+    ties: TieCredit = "fractional",
     groups: Groups | None = None,
     seed: int | np.random.Generator = 0,
 ) -> LearningCurve:
@@ -289,19 +296,19 @@ def learning_curve(
     import pandas as pd
     from sklearn.base import clone
 
-    walks = list(X)
-    check_learnable(walks)
+    trajectories = list(X)
+    check_learnable(trajectories)
     _check_options(fractions, cut, repeats)
     named = _named(predictors)
     rng = np.random.default_rng(seed)
     rows = []
-    splits = [nested_training_sets(walks, test_share, rng, groups) for _ in range(repeats)]
+    splits = [nested_training_sets(trajectories, test_share, rng, groups) for _ in range(repeats)]
     # Groups are of different sizes: the smallest pool decides, so that every repeat has the same training sizes.
     counts = _sizes(sizes, min(len(pool) for pool, _ in splits))
     for repeat, (pool, test) in enumerate(splits):
-        judged = [walks[i] for i in test]
+        judged = [trajectories[i] for i in test]
         for size in counts:
-            learned = [walks[i] for i in pool[:size]]
+            learned = [trajectories[i] for i in pool[:size]]
             _check_known(learned, judged)
             for name, predictor in named.items():
                 fitted = clone(predictor).fit(learned)
@@ -310,7 +317,7 @@ def learning_curve(
                 for fraction, accuracy in zip(fractions, correct, strict=True):
                     rows.append((name, repeat, size, len(judged), float(fraction), float(accuracy)))
     columns = ["predictor", "repeat", "size", "judged", "fraction", "accuracy"]
-    return LearningCurve(pd.DataFrame(rows, columns=columns), cut, ties, walks[0].candidate_set, test_share)
+    return LearningCurve(pd.DataFrame(rows, columns=columns), cut, ties, trajectories[0].candidate_set, test_share)
 
 
 def _sizes(sizes: Sequence[int | float], available: int) -> list[int]:
@@ -327,7 +334,7 @@ def _sizes(sizes: Sequence[int | float], available: int) -> list[int]:
 
 
 def _check_known(learned: Sequence[Trajectory], judged: Sequence[Trajectory]) -> None:
-    known = {name for walk in learned for name in walk.candidates}
-    unknown = sorted({name for walk in judged for name in walk.candidates} - known)
+    known = {name for trajectory in learned for name in trajectory.candidates}
+    unknown = sorted({name for trajectory in judged for name in trajectory.candidates} - known)
     if unknown:
         raise ValueError(f"{len(learned)} trajectories to learn from never mention goals {unknown}; use larger sizes")

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import Trajectory
-from predictors.base import TIE_TOLERANCE, GoalPredictor
+from predictors.base import TIE_TOLERANCE, GoalPredictor, check_trajectories
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -102,34 +102,42 @@ class ThresholdDecision:
         import pandas as pd
 
         levels = [_checked_threshold(threshold) for threshold in thresholds]
-        walks = GoalPredictor._check_trajectories(X)
-        beliefs = self._beliefs(walks)
+        trajectories = check_trajectories(X)
+        beliefs = self._beliefs(trajectories)
         rows = [
-            _row(number, walk, level, self._first_decision(walk, belief, level))
+            _row(number, trajectory, level, self._first_decision(trajectory, belief, level))
             for level in levels
-            for number, (walk, belief) in enumerate(zip(walks, beliefs, strict=True))
+            for number, (trajectory, belief) in enumerate(zip(trajectories, beliefs, strict=True))
         ]
         return pd.DataFrame(rows, columns=list(_row(0, _NOBODY, 1.0, None)))
 
-    def _beliefs(self, walks: Sequence[Trajectory]) -> list[npt.NDArray[np.float64]]:
+    def _beliefs(self, trajectories: Sequence[Trajectory]) -> list[npt.NDArray[np.float64]]:
         """For each trajectory ``(steps, candidates)`` the belief after 1, 2, … states."""
-        steps = [walk.num_states - walk.complete for walk in walks]
-        prefixes = [walk.first(t) for walk, count in zip(walks, steps, strict=True) for t in range(1, count + 1)]
+        steps = [trajectory.num_states - trajectory.complete for trajectory in trajectories]
+        prefixes = [
+            trajectory.first(t)
+            for trajectory, count in zip(trajectories, steps, strict=True)
+            for t in range(1, count + 1)
+        ]
         rows = self.predictor.predict_proba(prefixes) if prefixes else np.zeros((0, 0))
         ends = np.cumsum([max(count, 0) for count in steps], dtype=np.intp)
         return [
-            rows[end - max(count, 0) : end][:, self.predictor._columns(walk)] if count > 0 else np.zeros((0, 0))
-            for walk, count, end in zip(walks, steps, ends, strict=True)
+            rows[end - max(count, 0) : end][:, self.predictor.candidate_columns(trajectory)]
+            if count > 0
+            else np.zeros((0, 0))
+            for trajectory, count, end in zip(trajectories, steps, ends, strict=True)
         ]
 
-    def _first_decision(self, walk: Trajectory, beliefs: npt.NDArray[np.float64], threshold: float) -> Decision | None:
+    def _first_decision(
+        self, trajectory: Trajectory, beliefs: npt.NDArray[np.float64], threshold: float
+    ) -> Decision | None:
         previous, count = None, 0
         for step, belief in enumerate(beliefs, 1):
             top = _sure_of(belief, threshold)
             count = 0 if top is None else count + 1 if top == previous else 1
             previous = top
             if top is not None and count >= self.patience:
-                return Decision(walk.candidates[top], float(belief[top]), step, float(walk.times[step - 1]))
+                return Decision(trajectory.candidates[top], float(belief[top]), step, float(trajectory.times[step - 1]))
         return None
 
 
@@ -207,25 +215,25 @@ def summarise_decisions(rows: pd.DataFrame, by: Sequence[str] = ("threshold",)) 
 _NOBODY: Final = Trajectory(np.zeros((0, 2), dtype=np.int64), candidates=("nothing",))
 
 
-def _row(number: int, walk: Trajectory, threshold: float, decision: Decision | None) -> dict[str, Any]:
+def _row(number: int, trajectory: Trajectory, threshold: float, decision: Decision | None) -> dict[str, Any]:
     nan = float("nan")
-    first, last = (float(walk.times[0]), float(walk.times[-1])) if walk.num_states else (nan, nan)
-    right = None if decision is None else decision.goal == walk.goal
+    first, last = (float(trajectory.times[0]), float(trajectory.times[-1])) if trajectory.num_states else (nan, nan)
+    right = None if decision is None else decision.goal == trajectory.goal
     return {
         "trajectory": number,
-        "participant": walk.participant,
-        "condition": walk.condition,
-        "layout": walk.layout_name or (walk.layout.layout_id if walk.layout is not None else ""),
-        "goal": walk.goal or "",
+        "participant": trajectory.participant,
+        "condition": trajectory.condition,
+        "layout": trajectory.layout_name or (trajectory.layout.layout_id if trajectory.layout is not None else ""),
+        "goal": trajectory.goal or "",
         "threshold": threshold,
         "decided": decision is not None,
         "decision": "" if decision is None else decision.goal,
         "probability": nan if decision is None else decision.probability,
         "step": 0 if decision is None else decision.step,
-        "fraction": nan if decision is None else decision.step / walk.num_states,
+        "fraction": nan if decision is None else decision.step / trajectory.num_states,
         "time": nan if decision is None else decision.time - first,
         "lead": nan if decision is None else last - decision.time,
-        "correct": nan if walk.goal is None else float(bool(right)),
+        "correct": nan if trajectory.goal is None else float(bool(right)),
     }
 
 

@@ -35,16 +35,16 @@ class GridNeighbours(PrefixPredictor):
         if isinstance(self.k, bool) or not isinstance(self.k, int) or self.k < 1:
             raise ValueError(f"`k` must be an integer >= 1, got {self.k!r}")
 
-    def _learn(self, walks: Sequence[Trajectory]) -> None:
-        self._encoder = PrefixEncoder(walks, self.classes_)
-        features, weights = distinct_prefixes(walks, self._encoder, self.classes_)
+    def _learn(self, trajectories: Sequence[Trajectory]) -> None:
+        self._encoder = PrefixEncoder(trajectories, self.classes_)
+        features, weights = distinct_prefixes(trajectories, self._encoder, self.classes_)
         self._columns_first, self._weights = np.ascontiguousarray(features.T), weights
         self._squares = (features**2).sum(axis=1)
         self._sizes = weights.sum(axis=1)
         self._fallback = self._prior.of(self.classes_.tolist())
 
-    def _read(self, walk: Trajectory, cells: Steps) -> npt.NDArray[np.float64]:
-        query = self._encoder.encode(walk, cells)
+    def _read(self, trajectory: Trajectory, cells: Steps) -> npt.NDArray[np.float64]:
+        query = self._encoder.encode(trajectory, cells)
         there = np.flatnonzero(query)  # a dozen features of hundreds
         found = votes_of_nearest(
             there, query[there], self._columns_first, self._squares, self._weights, self._sizes, float(self.k)
@@ -77,29 +77,29 @@ class GridNGram(PrefixPredictor):
         if not isinstance(self.strength, int | float) or not 0 < self.strength < np.inf:
             raise ValueError(f"`strength` must be a finite number above 0, got {self.strength!r}")
 
-    def _contexts(self, walk: Trajectory, cells: Steps) -> Iterator[tuple[object, ...]]:
+    def _contexts(self, trajectory: Trajectory, cells: Steps) -> Iterator[tuple[object, ...]]:
         """The last 1, 2, … n steps."""
-        steps = (walk.start, *cells)
-        place = self._places.get(walk.layout, -1)
+        steps = (trajectory.start, *cells)
+        place = self._places.get(trajectory.layout, -1)
         for count in range(1, min(self.n, len(steps)) + 1):
             yield (place, *steps[-count:])
 
-    def _learn(self, walks: Sequence[Trajectory]) -> None:
+    def _learn(self, trajectories: Sequence[Trajectory]) -> None:
         column = {name: number for number, name in enumerate(self.classes_.tolist())}
         self._counts: dict[tuple[object, ...], npt.NDArray[np.float64]] = {}
-        layouts = dict.fromkeys(walk.layout for walk in walks)
+        layouts = dict.fromkeys(trajectory.layout for trajectory in trajectories)
         self._places = {layout: number for number, layout in enumerate(layouts)}
-        for walk in walks:
-            cells: Steps = tuple(map(tuple, walk.states[:-1].tolist()))
+        for trajectory in trajectories:
+            cells: Steps = tuple(map(tuple, trajectory.states[:-1].tolist()))
             for end in range(1, len(cells) + 1):
-                for context in self._contexts(walk, cells[:end]):
+                for context in self._contexts(trajectory, cells[:end]):
                     counts = self._counts.setdefault(context, np.zeros(len(column)))
-                    counts[column[walk.goal or ""]] += 1.0
+                    counts[column[trajectory.goal or ""]] += 1.0
         self._fallback = self._prior.of(self.classes_.tolist())
 
-    def _read(self, walk: Trajectory, cells: Steps) -> npt.NDArray[np.float64]:
+    def _read(self, trajectory: Trajectory, cells: Steps) -> npt.NDArray[np.float64]:
         shares = self._fallback
-        for context in self._contexts(walk, cells):
+        for context in self._contexts(trajectory, cells):
             counts = self._counts.get(context)
             if counts is None:  # longer ones were not seen either
                 break
@@ -136,17 +136,17 @@ class GridLogistic(PrefixPredictor):
             if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < np.inf:
                 raise ValueError(f"`{name}` must be a finite number above 0, got {value!r}")
 
-    def _learn(self, walks: Sequence[Trajectory]) -> None:
+    def _learn(self, trajectories: Sequence[Trajectory]) -> None:
         from sklearn.linear_model import LogisticRegression
 
-        self._encoder = PrefixEncoder(walks, self.classes_)
-        features, weights = distinct_prefixes(walks, self._encoder, self.classes_)
+        self._encoder = PrefixEncoder(trajectories, self.classes_)
+        features, weights = distinct_prefixes(trajectories, self._encoder, self.classes_)
         count = len(self.classes_)
         self.coef_ = np.zeros((count, self._encoder.width))
         self.intercept_ = np.full(count, -np.inf)
         rows, goals = np.nonzero(weights)
         seen = np.unique(goals)
-        self._trust = len(walks) / (len(walks) + count)
+        self._trust = len(trajectories) / (len(trajectories) + count)
         self._fallback = self._prior.of(self.classes_.tolist())
         if len(seen) == 1:
             self.intercept_[seen] = 0.0
@@ -158,7 +158,7 @@ class GridLogistic(PrefixPredictor):
             coef, intercept = np.vstack([-coef, coef]) / 2, np.concatenate([-intercept, intercept]) / 2
         self.coef_[seen], self.intercept_[seen] = coef, intercept
 
-    def _read(self, walk: Trajectory, cells: Steps) -> npt.NDArray[np.float64]:
-        scores = self.coef_ @ self._encoder.encode(walk, cells) + self.intercept_
+    def _read(self, trajectory: Trajectory, cells: Steps) -> npt.NDArray[np.float64]:
+        scores = self.coef_ @ self._encoder.encode(trajectory, cells) + self.intercept_
         weights = np.exp(scores - scores.max())
         return self._trust * weights / weights.sum() + (1 - self._trust) * self._fallback

@@ -11,8 +11,8 @@ from sklearn.base import clone
 
 from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.rollouts.trajectory import Trajectory
-from predictors.grid.base import GridPredictor, check_complete, posterior, remaining_steps
-from predictors.grid.graphs import optimal_costs, soft_costs, walk_graph
+from predictors.grid.base import GridPredictor, check_complete, goal_posterior, remaining_steps
+from predictors.grid.graphs import soft_costs, station_costs, walk_graph
 from predictors.grid.maxent_irl import MaxEntIRL
 from predictors.grid.priors import GoalPrior, Prior
 from predictors.grid.walk_likelihood import best_uniform_cost, collect_evidence
@@ -87,20 +87,20 @@ class BayesianGoalPredictor(GridPredictor):
         """
         self._check_parameters()
         super().fit(X, y)
-        walks = list(X)
-        self._prior = GoalPrior(self.prior, walks, self.classes_)
+        trajectories = list(X)
+        self._prior = GoalPrior(self.prior, trajectories, self.classes_)
         self._tables: dict[tuple[OvercookedLayout, tuple[str, ...]], npt.NDArray[np.float64]] = {}
         if self.beta == "fit":
-            for number, walk in enumerate(walks):
-                check_complete(walk, number)
-            self.beta_ = best_uniform_cost(collect_evidence(walks))
+            for number, trajectory in enumerate(trajectories):
+                check_complete(trajectory, number)
+            self.beta_ = best_uniform_cost(collect_evidence(trajectories))
         else:
             self.beta_ = 1.0 if self.beta is None else float(self.beta)
         self.__dict__.pop("irl_", None)
         if isinstance(self.cell_costs, MaxEntIRL):
-            self.irl_ = clone(self.cell_costs).fit(walks)
+            self.irl_ = clone(self.cell_costs).fit(trajectories)
         elif isinstance(self.cell_costs, str) and self.cell_costs == "learned":
-            self.irl_ = MaxEntIRL().fit(walks)
+            self.irl_ = MaxEntIRL().fit(trajectories)
         return self
 
     def _check_parameters(self) -> None:
@@ -144,7 +144,7 @@ class BayesianGoalPredictor(GridPredictor):
         else:
             costs = self.irl_.cost_map(layout) if hasattr(self, "irl_") else np.asarray(self.cell_costs, np.float64)
         if self.costs == "hard":
-            return self.beta_ * optimal_costs(layout, goals, costs)
+            return self.beta_ * station_costs(layout, goals, costs)
         beta = self.beta_
         if uniform and self.beta is None:
             beta = max(beta, walk_graph(layout, goals).divergence_cost + _MARGIN)
@@ -153,13 +153,13 @@ class BayesianGoalPredictor(GridPredictor):
         except ValueError as error:
             raise ValueError(f"{error}; raise `beta` ({self.beta_:.4g}) or give beta='fit'") from error
 
-    def candidate_probabilities(self, walk: Trajectory) -> npt.NDArray[np.float64]:
-        """``(len(walk.candidates),)`` probabilities in the order of the walk's candidates.
+    def candidate_probabilities(self, trajectory: Trajectory) -> npt.NDArray[np.float64]:
+        """``(len(trajectory.candidates),)`` probabilities in the order of the walk's candidates.
 
         Raises:
             ValueError: A walk that does not fit its layout, or a candidate that cannot be reached from its start.
         """
-        return posterior(walk, self._prior.of(walk.candidates), self.goal_costs)
+        return goal_posterior(trajectory, self._prior.of(trajectory.candidates), self.goal_costs)
 
     def __getstate__(self) -> dict[str, Any]:
         """Without the tables, which are made again when asked for."""

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from legible_envs.overcooked.layout import OvercookedLayout
 from predictors.grid.walk_kernels import cheapest_costs, walk_costs
 
-__all__ = ["WalkGraph", "optimal_costs", "soft_costs", "walk_graph"]
+__all__ = ["WalkGraph", "soft_costs", "station_costs", "walk_graph"]
 
 _MOVES = ((-1, 0), (1, 0), (0, -1), (0, 1))
 
@@ -71,7 +71,7 @@ def walk_graph(layout: OvercookedLayout, goals: tuple[str, ...]) -> WalkGraph:
     return WalkGraph(layout, goals, cells, index, neighbours, access, int(away.max(initial=0)))
 
 
-def optimal_costs(
+def station_costs(
     layout: OvercookedLayout, goals: tuple[str, ...], cell_costs: npt.NDArray[np.float64]
 ) -> npt.NDArray[np.float64]:
     """Cost of the cheapest walk from every cell into each station.

@@ -10,7 +10,8 @@ import numpy.typing as npt
 
 from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.rollouts.trajectory import Trajectory
-from predictors.grid.base import GridPredictor, check_complete, posterior
+from predictors.base import check_trajectories
+from predictors.grid.base import GridPredictor, check_complete, goal_posterior
 from predictors.grid.graphs import soft_costs
 from predictors.grid.priors import GoalPrior, Prior
 from predictors.grid.walk_likelihood import (
@@ -123,11 +124,11 @@ class MaxEntIRL(GridPredictor):
         """
         self._check_parameters()
         super().fit(X, y)
-        walks = list(X)
-        for number, walk in enumerate(walks):
-            check_complete(walk, number)
-        self._prior = GoalPrior(self.prior, walks, self.classes_)
-        evidence = collect_evidence(walks)
+        trajectories = list(X)
+        for number, trajectory in enumerate(trajectories):
+            check_complete(trajectory, number)
+        self._prior = GoalPrior(self.prior, trajectories, self.classes_)
+        evidence = collect_evidence(trajectories)
         self.uniform_cost_ = best_uniform_cost(evidence)
         self.costs_, self._tables, value = {}, {}, 0.0
         self.n_iter_, self.converged_ = 0, True
@@ -138,7 +139,7 @@ class MaxEntIRL(GridPredictor):
                 value += loss
         else:
             self.coef_, value = self._learn(evidence, self._feature_map())
-        self.log_likelihood_ = -value / len(walks)
+        self.log_likelihood_ = -value / len(trajectories)
         for name in ("cost_", "reward_"):
             self.__dict__.pop(name, None)
         if len(self.costs_) == 1:
@@ -202,13 +203,13 @@ class MaxEntIRL(GridPredictor):
             table = self._tables[layout, goals] = soft_costs(layout, goals, self.cost_map(layout))
         return table
 
-    def candidate_probabilities(self, walk: Trajectory) -> Floats:
-        """``(len(walk.candidates),)`` probabilities in the order of the walk's candidates.
+    def candidate_probabilities(self, trajectory: Trajectory) -> Floats:
+        """``(len(trajectory.candidates),)`` probabilities in the order of the walk's candidates.
 
         Raises:
             ValueError: A walk that does not fit its layout, or a candidate that cannot be reached from its start.
         """
-        return posterior(walk, self._prior.of(walk.candidates), self.goal_costs)
+        return goal_posterior(trajectory, self._prior.of(trajectory.candidates), self.goal_costs)
 
     def log_likelihoods(self, X: Sequence[Trajectory]) -> Floats:
         """``(n,)`` log-probability of each complete walk given its start and goal, in nats.
@@ -216,13 +217,13 @@ class MaxEntIRL(GridPredictor):
         Raises:
             ValueError: Prefixes, or walks that do not fit their layout.
         """
-        walks = self._check_trajectories(X)
-        result = np.empty(len(walks))
-        for number, walk in enumerate(walks):
-            layout = check_complete(walk, number)
-            self._columns(walk)
-            goal = walk.goal or ""
-            cells = walk.states[:-1]
+        trajectories = check_trajectories(X)
+        result = np.empty(len(trajectories))
+        for number, trajectory in enumerate(trajectories):
+            layout = check_complete(trajectory, number)
+            self.candidate_columns(trajectory)
+            goal = trajectory.goal or ""
+            cells = trajectory.states[:-1]
             table = self.goal_costs(layout, (goal,))
             result[number] = table[(*cells[0], 0)] - self.cost_map(layout)[cells[1:, 0], cells[1:, 1]].sum()
         return result

@@ -26,21 +26,21 @@ class GoalPrior:
 
     Args:
         kind: ``"uniform"`` or ``"empirical"``.
-        walks: Trajectories to count goals in; those without a known goal are passed over.
+        trajectories: Trajectories to count goals in; those without a known goal are passed over.
         classes: ``(K,)`` names of all goals.
 
     Raises:
         ValueError: Another kind.
     """
 
-    def __init__(self, kind: Prior, walks: Sequence[Trajectory], classes: npt.NDArray[np.str_]) -> None:
+    def __init__(self, kind: Prior, trajectories: Sequence[Trajectory], classes: npt.NDArray[np.str_]) -> None:
         if kind not in PRIORS:
             raise ValueError(f"`prior` must be one of {PRIORS}, got {kind!r}")
         self._rates: dict[str, float] = {}
         if kind == "empirical":
-            known = [walk for walk in walks if walk.goal is not None]
-            chosen = Counter(walk.goal for walk in known)
-            offered = Counter(name for walk in known for name in walk.candidates)
+            known = [trajectory for trajectory in trajectories if trajectory.goal is not None]
+            chosen = Counter(trajectory.goal for trajectory in known)
+            offered = Counter(name for trajectory in known for name in trajectory.candidates)
             names = classes.tolist()
             self._rates = {name: (chosen[name] + 1.0) / (offered[name] + len(names)) for name in names}
 

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import Trajectory
 from predictors.base import TIE_TOLERANCE
-from predictors.grid.base import GridPredictor, check_walk, remaining_steps
+from predictors.grid.base import GridPredictor, check_trajectory, remaining_steps
 from predictors.reaching.base import goal_places, learn_places, straight_lines
 
 __all__ = ["ShortestDistance"]
@@ -50,8 +50,8 @@ class ShortestDistance(GridPredictor):
         self.places_ = learn_places(X) if self.metric == "euclidean" else {}
         return self
 
-    def candidate_probabilities(self, walk: Trajectory) -> npt.NDArray[np.float64]:
-        """``(len(walk.candidates),)`` probabilities in the order of the walk's candidates.
+    def candidate_probabilities(self, trajectory: Trajectory) -> npt.NDArray[np.float64]:
+        """``(len(trajectory.candidates),)`` probabilities in the order of the walk's candidates.
 
         Raises:
             ValueError: An unknown metric, or a walk that does not fit its layout.
@@ -59,30 +59,30 @@ class ShortestDistance(GridPredictor):
         if self.metric not in ("manhattan", "geodesic", "euclidean"):
             raise ValueError(f"`metric` must be 'manhattan', 'geodesic' or 'euclidean', got {self.metric!r}")
         if self.metric == "euclidean":
-            return self._nearest(self._straight_lines(walk))
-        layout = check_walk(walk)
-        count = len(walk.candidates)
-        if not walk.num_states:
+            return self._nearest(self._straight_lines(trajectory))
+        layout = check_trajectory(trajectory)
+        count = len(trajectory.candidates)
+        if not trajectory.num_states:
             return np.full(count, 1.0 / count)
-        row, col = walk.states[-1].tolist()
+        row, col = trajectory.states[-1].tolist()
         if self.metric == "geodesic":
-            distances = remaining_steps(layout, walk.candidates)[row, col]
+            distances = remaining_steps(layout, trajectory.candidates)[row, col]
         else:
-            missing = [goal for goal in walk.candidates if goal not in layout.stations]
+            missing = [goal for goal in trajectory.candidates if goal not in layout.stations]
             if missing:
                 raise ValueError(
                     f"the candidates {missing} are no stations of the layout, which has {list(layout.stations)}"
                 )
-            stations = np.array([layout.stations[goal] for goal in walk.candidates])
+            stations = np.array([layout.stations[goal] for goal in trajectory.candidates])
             distances = np.abs(stations - (row, col)).sum(axis=1).astype(np.float64)
         if np.isinf(distances).all():
-            raise ValueError(f"no candidate of {walk.candidates} can be reached from row {row}, column {col}")
+            raise ValueError(f"no candidate of {trajectory.candidates} can be reached from row {row}, column {col}")
         return self._nearest(distances)
 
-    def _straight_lines(self, walk: Trajectory) -> npt.NDArray[np.float64]:
-        if not walk.num_states:
-            return np.zeros(len(walk.candidates))
-        return straight_lines(walk.states[-1], goal_places(walk, self.places_))
+    def _straight_lines(self, trajectory: Trajectory) -> npt.NDArray[np.float64]:
+        if not trajectory.num_states:
+            return np.zeros(len(trajectory.candidates))
+        return straight_lines(trajectory.states[-1], goal_places(trajectory, self.places_))
 
     @staticmethod
     def _nearest(distances: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:

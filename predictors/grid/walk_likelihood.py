@@ -73,24 +73,24 @@ class Fit:
     converged: bool
 
 
-def collect_evidence(walks: Sequence[Trajectory]) -> dict[OvercookedLayout, Evidence]:
+def collect_evidence(trajectories: Sequence[Trajectory]) -> dict[OvercookedLayout, Evidence]:
     """Sum up complete walks, which must fit their layouts, per kitchen."""
     groups: dict[OvercookedLayout, list[Trajectory]] = {}
-    for walk in walks:
-        assert isinstance(walk.layout, OvercookedLayout)
-        groups.setdefault(walk.layout, []).append(walk)
+    for trajectory in trajectories:
+        assert isinstance(trajectory.layout, OvercookedLayout)
+        groups.setdefault(trajectory.layout, []).append(trajectory)
     return {layout: _sum_up(layout, members) for layout, members in groups.items()}
 
 
-def _sum_up(layout: OvercookedLayout, walks: Sequence[Trajectory]) -> Evidence:
-    names = tuple(sorted({walk.goal for walk in walks if walk.goal is not None}))
+def _sum_up(layout: OvercookedLayout, trajectories: Sequence[Trajectory]) -> Evidence:
+    names = tuple(sorted({trajectory.goal for trajectory in trajectories if trajectory.goal is not None}))
     graph = walk_graph(layout, names)
     visits = np.zeros(len(graph.cells))
     pairs: Counter[tuple[int, int]] = Counter()
-    for walk in walks:
-        numbers = graph.index[walk.states[:-1, 0], walk.states[:-1, 1]]
+    for trajectory in trajectories:
+        numbers = graph.index[trajectory.states[:-1, 0], trajectory.states[:-1, 1]]
         np.add.at(visits, numbers[1:], 1.0)
-        pairs[int(numbers[0]), names.index(walk.goal or "")] += 1
+        pairs[int(numbers[0]), names.index(trajectory.goal or "")] += 1
     keys = np.array(sorted(pairs), dtype=np.int64).reshape(-1, 2)
     weights = np.array([pairs[start, goal] for start, goal in keys.tolist()], dtype=np.float64)
     return Evidence(graph, visits, keys[:, 0].copy(), keys[:, 1].copy(), weights)

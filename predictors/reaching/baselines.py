@@ -14,7 +14,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
 from legible_envs.rollouts.trajectory import Cut, Trajectory
-from predictors.base import FRACTIONS, GoalPredictor
+from predictors.base import FRACTIONS, GoalPredictor, check_trajectories
 from predictors.reaching.features import Reach, check_dimension, check_reaches
 
 __all__ = ["ReachLogistic", "ReachNeighbours"]
@@ -38,12 +38,12 @@ class _MomentClassifier(GoalPredictor):
             ValueError: Parameters out of range; a prefix, an unknown goal, a reach of one state, mixed dimensions.
         """
         super().fit(X, y)
-        walks = list(X)
-        self.n_dims_ = check_reaches(walks)
-        goals = np.array([walk.goal for walk in walks])
+        trajectories = list(X)
+        self.n_dims_ = check_reaches(trajectories)
+        goals = np.array([trajectory.goal for trajectory in trajectories])
         self.goals_, counts = np.unique(goals, return_counts=True)
         self.prior_ = counts / counts.sum()
-        moments = [_moments(walk)[1:] for walk in walks]
+        moments = [_moments(trajectory)[1:] for trajectory in trajectories]
         labels = np.repeat(np.searchsorted(self.goals_, goals), [len(rows) for rows in moments])
         self._classifier = self._make(len(labels)).fit(np.concatenate(moments), labels) if len(counts) > 1 else None
         return self
@@ -58,39 +58,39 @@ class _MomentClassifier(GoalPredictor):
 
     def predict_proba(self, X: Sequence[Trajectory]) -> npt.NDArray[np.float64]:
         """See :meth:`GoalPredictor.predict_proba`."""
-        walks = self._check_trajectories(X)
+        trajectories = check_trajectories(X)
         rows: list[npt.NDArray[np.float64] | None] = []
-        for walk in walks:
-            self._columns(walk)
-            check_dimension(walk, self.n_dims_)
-            rows.append(_moments(walk)[-1] if walk.num_states > 1 else None)
-        return self._beliefs(walks, rows)
+        for trajectory in trajectories:
+            self.candidate_columns(trajectory)
+            check_dimension(trajectory, self.n_dims_)
+            rows.append(_moments(trajectory)[-1] if trajectory.num_states > 1 else None)
+        return self._beliefs(trajectories, rows)
 
     def predict_proba_at(
         self, X: Sequence[Trajectory], fractions: Sequence[float] = FRACTIONS, cut: Cut = "steps"
     ) -> npt.NDArray[np.float64]:
         """See :meth:`GoalPredictor.predict_proba_at`; features of a reach are computed once for all fractions."""
-        walks = self._check_trajectories(X)
+        trajectories = check_trajectories(X)
         rows: list[npt.NDArray[np.float64] | None] = []
-        for walk in walks:
-            self._columns(walk)
-            check_dimension(walk, self.n_dims_)
-            moments = _moments(walk)
-            lengths = [walk.prefix_length(fraction, cut) for fraction in fractions]
+        for trajectory in trajectories:
+            self.candidate_columns(trajectory)
+            check_dimension(trajectory, self.n_dims_)
+            moments = _moments(trajectory)
+            lengths = [trajectory.prefix_length(fraction, cut) for fraction in fractions]
             rows += [moments[length - 1] if length > 1 else None for length in lengths]
-        beliefs = self._beliefs([walk for walk in walks for _ in fractions], rows)
-        return beliefs.reshape(len(walks), len(fractions), len(self.classes_))
+        beliefs = self._beliefs([trajectory for trajectory in trajectories for _ in fractions], rows)
+        return beliefs.reshape(len(trajectories), len(fractions), len(self.classes_))
 
     def _beliefs(
-        self, walks: Sequence[Trajectory], rows: Sequence[npt.NDArray[np.float64] | None]
+        self, trajectories: Sequence[Trajectory], rows: Sequence[npt.NDArray[np.float64] | None]
     ) -> npt.NDArray[np.float64]:
         """``(n, C)`` beliefs; None for a walk stands for nothing known."""
-        columns = [self._columns(walk) for walk in walks]
-        weights = np.tile(self.prior_, (len(walks), 1))
+        columns = [self.candidate_columns(trajectory) for trajectory in trajectories]
+        weights = np.tile(self.prior_, (len(trajectories), 1))
         seen = [i for i, row in enumerate(rows) if row is not None]
         if seen and self._classifier is not None:
             weights[seen] = self._smoothed(self._classifier.predict_proba(np.array([rows[i] for i in seen])))
-        probabilities = np.zeros((len(walks), len(self.classes_)))
+        probabilities = np.zeros((len(trajectories), len(self.classes_)))
         places = np.searchsorted(self.classes_, self.goals_)
         for i, candidates in enumerate(columns):
             full = np.zeros(len(self.classes_))
@@ -160,7 +160,7 @@ class ReachNeighbours(_MomentClassifier):
         return (self.n_neighbors_ * weights + self.prior_) / (self.n_neighbors_ + 1)
 
 
-def _moments(walk: Trajectory) -> npt.NDArray[np.float64]:
+def _moments(trajectory: Trajectory) -> npt.NDArray[np.float64]:
     """``(T, 2 d + 1)`` position, velocity and time of every sample."""
-    reach = Reach(walk)
+    reach = Reach(trajectory)
     return np.column_stack([reach.features(True), reach.times])

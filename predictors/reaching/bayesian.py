@@ -57,23 +57,29 @@ class StraightLineBayesian(PlacePredictor):
         if isinstance(self.beta, bool) or not isinstance(self.beta, int | float) or not 0 <= self.beta < np.inf:
             raise ValueError(f"`beta` must be a finite number >= 0, got {self.beta!r}")
 
-    def weigh_walk(self, walk: Trajectory) -> npt.NDArray[np.float64]:
+    def weigh_trajectory(self, trajectory: Trajectory) -> npt.NDArray[np.float64]:
         """See :meth:`PlacePredictor.weigh_walk`.
 
         Raises:
             ValueError: A candidate is no object of the trajectory's table.
         """
-        if not self.obstacles or not isinstance(walk.layout, TabletopLayout):
-            return super().weigh_walk(walk)
+        if not self.obstacles or not isinstance(trajectory.layout, TabletopLayout):
+            return super().weigh_trajectory(trajectory)
         from legible_envs.tabletop.partner.belief import EqOneBelief
 
         self._check_beta()
-        if walk.is_grid or walk.states.shape[1] != 2:
-            raise ValueError(f"expected positions (x, y) on a table, got {walk.states.shape[1]}-d {walk.states.dtype}")
+        if trajectory.is_grid or trajectory.states.shape[1] != 2:
+            raise ValueError(
+                f"expected positions (x, y) on a table, got {trajectory.states.shape[1]}-d {trajectory.states.dtype}"
+            )
         belief = EqOneBelief(
-            walk.layout, self.beta, start=walk.states[0], goals=walk.candidates, positions=walk.goal_positions
+            trajectory.layout,
+            self.beta,
+            start=trajectory.states[0],
+            goals=trajectory.candidates,
+            positions=trajectory.goal_positions,
         )
-        return np.array(list(belief.update(walk.states[-1]).values()))
+        return np.array(list(belief.update(trajectory.states[-1]).values()))
 
     def weigh(self, states: npt.NDArray[np.floating], places: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """See :meth:`PlacePredictor.weigh`."""

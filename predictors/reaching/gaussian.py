@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import Cut, Trajectory
-from predictors.base import FRACTIONS, GoalPredictor, GoalStream
+from predictors.base import FRACTIONS, GoalPredictor, GoalStream, check_trajectories
 from predictors.reaching.alignment_kernels import dba_step, match_means, pairwise_costs
 from predictors.reaching.features import Reach, check_dimension, check_reaches, resample
 from predictors.reaching.open_end_kernels import observe
@@ -109,11 +109,11 @@ class TimeSeriesGaussian(GoalPredictor):
         """
         self._check_parameters()
         super().fit(X, y)
-        walks = list(X)
-        self.n_dims_ = check_reaches(walks)
+        trajectories = list(X)
+        self.n_dims_ = check_reaches(trajectories)
         by_goal: dict[str, list[Reach]] = {}
-        for walk in walks:
-            by_goal.setdefault(str(walk.goal), []).append(Reach(walk))
+        for trajectory in trajectories:
+            by_goal.setdefault(str(trajectory.goal), []).append(Reach(trajectory))
         self.goals_ = np.array(sorted(by_goal))
         self.counts_ = np.array([len(by_goal[goal]) for goal in self.goals_])
         self.durations_ = np.array([np.mean([r.duration for r in by_goal[goal]]) for goal in self.goals_])
@@ -181,32 +181,34 @@ class TimeSeriesGaussian(GoalPredictor):
         Raises:
             ValueError: Also a prefix if ``online="fraction"``, which needs to know the duration.
         """
-        walks = self._check_trajectories(X)
-        columns = [self._columns(walk) for walk in walks]
-        probabilities = np.zeros((len(walks), len(self.classes_)))
-        for row, walk in enumerate(walks):
-            if self.online == "fraction" and not walk.complete and walk.num_states > 1:
+        trajectories = check_trajectories(X)
+        columns = [self.candidate_columns(trajectory) for trajectory in trajectories]
+        probabilities = np.zeros((len(trajectories), len(self.classes_)))
+        for row, trajectory in enumerate(trajectories):
+            if self.online == "fraction" and not trajectory.complete and trajectory.num_states > 1:
                 raise ValueError(
                     "online='fraction' needs the duration of the whole reach, which a prefix does not tell; use "
                     "`predict_proba_at`, or online='open-end' for motion that is still going on"
                 )
-            duration = float(walk.times[-1] - walk.times[0]) if walk.num_states else 0.0
-            scores = self._scores(walk, duration)
-            probabilities[row, columns[row]] = self._belief(scores[-1] if len(scores) else None, walk.candidates)
+            duration = float(trajectory.times[-1] - trajectory.times[0]) if trajectory.num_states else 0.0
+            scores = self._scores(trajectory, duration)
+            probabilities[row, columns[row]] = self._belief(scores[-1] if len(scores) else None, trajectory.candidates)
         return probabilities
 
     def predict_proba_at(
         self, X: Sequence[Trajectory], fractions: Sequence[float] = FRACTIONS, cut: Cut = "steps"
     ) -> npt.NDArray[np.float64]:
         """See :meth:`GoalPredictor.predict_proba_at`; one pass over each reach answers all fractions."""
-        walks = self._check_trajectories(X)
-        probabilities = np.zeros((len(walks), len(fractions), len(self.classes_)))
-        for row, walk in enumerate(walks):
-            columns = self._columns(walk)
-            lengths = [walk.prefix_length(fraction, cut) for fraction in fractions]
-            scores = self._scores(walk.first(max(lengths, default=0)), float(walk.times[-1] - walk.times[0]))
+        trajectories = check_trajectories(X)
+        probabilities = np.zeros((len(trajectories), len(fractions), len(self.classes_)))
+        for row, trajectory in enumerate(trajectories):
+            columns = self.candidate_columns(trajectory)
+            lengths = [trajectory.prefix_length(fraction, cut) for fraction in fractions]
+            scores = self._scores(
+                trajectory.first(max(lengths, default=0)), float(trajectory.times[-1] - trajectory.times[0])
+            )
             for i, length in enumerate(lengths):
-                probabilities[row, i, columns] = self._belief(scores[length - 1], walk.candidates)
+                probabilities[row, i, columns] = self._belief(scores[length - 1], trajectory.candidates)
         return probabilities
 
     def stream(self, context: Trajectory) -> GoalStream:
@@ -219,12 +221,12 @@ class TimeSeriesGaussian(GoalPredictor):
             raise ValueError("online='fraction' needs the duration of the whole reach; stream with online='open-end'")
         return ReachStream(self, context)
 
-    def _scores(self, walk: Trajectory, duration: float) -> npt.NDArray[np.float64]:
+    def _scores(self, trajectory: Trajectory, duration: float) -> npt.NDArray[np.float64]:
         """``(T, G)`` mean log-density of the samples so far, after each sample."""
-        check_dimension(walk, self.n_dims_)
-        if not walk.num_states:
+        check_dimension(trajectory, self.n_dims_)
+        if not trajectory.num_states:
             return np.zeros((0, len(self.goals_)))
-        reach = Reach(walk)
+        reach = Reach(trajectory)
         lows, highs = self._windows(reach.times, duration)
         return observe(
             reach.points,

@@ -35,7 +35,7 @@ from benchmarks.experiments.trial_rows import (
 from benchmarks.reports.experiment_report import Section
 from legible_envs.rollouts import Trajectory
 from legible_envs.tabletop import TabletopLayout, TabletopTask, TabletopWorkspace
-from predictors.base import NoReader
+from predictors import UniformPredictor
 
 SMALL = Settings(
     layouts=2,
@@ -149,9 +149,9 @@ def test_reaches_behind_covariances_are_balanced_and_rows_are_their_moments() ->
     assert [[last["xx"], last["xy"]], [last["xy"], last["yy"]]] == pytest.approx(np.cov(ends.T), abs=1e-12)
 
 
-def test_who_reads_nothing_never_knows() -> None:
+def test_the_uniform_predictor_stays_at_chance() -> None:
     context = Trajectory(np.zeros((1, 2)), candidates=("a", "b", "c", "d"))
-    belief = NoReader().stream(context)
+    belief = UniformPredictor().fit([context]).stream(context)
     assert belief.update((0.3, 0.4), 0.2) == dict.fromkeys("abcd", 0.25)
 
 

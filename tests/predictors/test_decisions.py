@@ -21,7 +21,7 @@ from predictors import (
     list_predictors,
     make_predictor,
 )
-from predictors.checks import example_walks
+from predictors.checks import example_trajectories
 from predictors.evaluation.decisions import Decision, summarise_decisions
 
 BUILT_IN = sorted(name for name, info in list_predictors().items() if info.origin == "built in")
@@ -59,7 +59,7 @@ def fitted(name: str) -> tuple[GoalPredictor, list[Trajectory]]:
     """A predictor fitted to what it can read: walks in a kitchen, or else reaches."""
     if name not in _FITTED:
         pytest.importorskip("torch") if name in QUICK else None
-        for walks in (example_walks(), reaches()):
+        for walks in (example_trajectories(), reaches()):
             predictor = make_predictor(name, **QUICK.get(name, {}))
             try:
                 predictor.fit(walks)
@@ -154,7 +154,7 @@ class Scripted(GoalPredictor):
         rows = np.zeros((len(X), len(self.classes_)))
         for row, walk in zip(rows, X, strict=True):
             first = walk.states[-1, 0] if walk.num_states else 0.5
-            row[self._columns(walk)] = first, 1 - first
+            row[self.candidate_columns(walk)] = first, 1 - first
         return rows
 
 
@@ -250,7 +250,7 @@ def test_every_predictor_can_decide(name: str) -> None:
 
 
 def test_standing_still_is_no_evidence_for_patience() -> None:
-    walk = example_walks()[0]
+    walk = example_trajectories()[0]
     predictor = BayesianGoalPredictor(beta=5.0).fit([walk])
     watcher = ThresholdDecision(predictor, 0.9, patience=2).stream(walk)
     for cell in ((3, 2), (2, 2), (1, 2), (1, 1), (1, 1), (1, 1)):
@@ -259,7 +259,7 @@ def test_standing_still_is_no_evidence_for_patience() -> None:
 
 
 def test_bad_rules_and_points() -> None:
-    walk = example_walks()[0]
+    walk = example_trajectories()[0]
     predictor = ShortestDistance().fit([walk])
     for threshold in (0, 1.1, math.nan, True, "high"):
         with pytest.raises(ValueError, match="a threshold must be above 0 and at most 1"):

@@ -29,7 +29,7 @@ from predictors import (
     check_predictor,
     make_predictor,
 )
-from predictors.checks import example_walks
+from predictors.checks import example_trajectories
 from predictors.grid.graphs import walk_graph
 from predictors.grid.nearest_kernels import votes_of_nearest
 from predictors.grid.priors import GoalPrior
@@ -428,4 +428,4 @@ def test_they_are_known_by_name() -> None:
     }
     for name, kind in names.items():
         assert type(make_predictor(name)) is kind
-    assert len(example_walks()) == 8
+    assert len(example_trajectories()) == 8

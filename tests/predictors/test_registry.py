@@ -34,7 +34,7 @@ from predictors import (
     register_predictor,
 )
 from predictors.base import correctness
-from predictors.checks import example_walks
+from predictors.checks import example_trajectories
 from predictors.evaluation import accuracy_at
 from predictors.registry import PredictorError
 
@@ -126,7 +126,7 @@ def test_the_heuristic_is_the_nearest_station(found: Trajectory, metric: str) ->
 
 @pytest.mark.parametrize("predictor", ALL, ids=repr)
 def test_nothing_observed_is_the_prior(predictor: GoalPredictor) -> None:
-    walks = example_walks()
+    walks = example_trajectories()
     rows = clone(predictor).fit(walks).predict_proba([w.first(0) for w in walks])
     for row, w in zip(rows, walks, strict=True):
         assert sorted(row, reverse=True)[: len(w.candidates)] == [1 / len(w.candidates)] * len(w.candidates)
@@ -141,7 +141,7 @@ def test_one_cell_leaks_nothing_to_eq_1() -> None:
 
 
 def test_complete_walks_are_read_right_by_everyone() -> None:
-    walks = example_walks()
+    walks = example_trajectories()
     for predictor in ALL:
         fitted = clone(predictor).fit(walks)
         assert fitted.predict(walks).tolist() == [w.goal for w in walks]
@@ -185,7 +185,7 @@ def test_bad_points_are_refused_and_change_nothing() -> None:
 
 
 def test_fractions_are_the_prefixes_they_name() -> None:
-    walks = example_walks()
+    walks = example_trajectories()
     fractions = (0.05, 0.3, 0.31, 0.8, 1.0)
     for predictor in ALL:
         fitted = clone(predictor).fit(walks)
@@ -260,7 +260,7 @@ def test_ties_count_what_they_are_worth() -> None:
 
 
 def test_the_score_is_the_expected_accuracy_of_guessing_among_ties() -> None:
-    walks = example_walks()
+    walks = example_trajectories()
     for predictor in ALL:
         fitted = clone(predictor).fit(walks)
         fractions = (0.2, 0.5, 0.8)
@@ -277,7 +277,7 @@ def test_the_score_is_the_expected_accuracy_of_guessing_among_ties() -> None:
 
 
 def test_tables_are_tidy_and_say_what_they_mean() -> None:
-    walks = example_walks()
+    walks = example_trajectories()
     fitted = BayesianGoalPredictor().fit(walks)
     table = accuracy_at(fitted, walks, (0.3, 0.6), cut="cells")
     assert len(table) == 2 * len(walks)
@@ -332,7 +332,7 @@ class Crowd(GoalPredictor):
     def predict_proba(self, X: Any) -> Any:
         rows = np.zeros((len(X), len(self.classes_)))
         for row, w in zip(rows, X, strict=True):
-            row[self._columns(w)] = 1 / len(w.candidates)
+            row[self.candidate_columns(w)] = 1 / len(w.candidates)
         best = rows.sum(axis=0).argmax()
         return np.where(rows[:, [best]] > 0, np.eye(len(self.classes_))[best], rows)
 
@@ -343,7 +343,7 @@ class Smallest(GoalPredictor):
     def predict_proba(self, X: Any) -> Any:
         rows = np.zeros((len(X), len(self.classes_)))
         for row, w in zip(rows, X, strict=True):
-            row[self._columns(w)] = 1 / len(w.candidates)
+            row[self.candidate_columns(w)] = 1 / len(w.candidates)
         return rows
 
 
@@ -358,7 +358,7 @@ def test_the_check_says_what_is_wrong() -> None:
     with pytest.raises(PredictorError, match="without being candidates"):
         check_predictor(Spreading)
     with pytest.raises(PredictorError, match="depends on the other samples"):
-        check_predictor(Crowd, example_walks()[:4])
+        check_predictor(Crowd, example_trajectories()[:4])
 
 
 def test_predictors_are_found_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
