@@ -1,10 +1,11 @@
-"""What :func:`predictors.registry.check_predictor` looks at."""
+"""The checks that :func:`predictors.registry.check_predictor` makes."""
 
 from __future__ import annotations
 
 import pickle
 from collections.abc import Callable, Sequence
 from copy import deepcopy
+from dataclasses import replace
 
 import numpy as np
 from sklearn.base import clone
@@ -25,7 +26,7 @@ XXSPX
 
 
 def example_trajectories() -> list[Trajectory]:
-    """Eight walks in a small kitchen, some with fewer candidates than others."""
+    """Eight trajectories in a small kitchen, some with fewer candidates than others."""
     layout = OvercookedLayout.from_ascii(_KITCHEN)
     three, two = ("onion", "tomato", "dish"), ("tomato", "onion")
     trajectories = [
@@ -122,26 +123,9 @@ def _check_independence(predictor: GoalPredictor, trajectories: Sequence[Traject
 def _check_ignorance(predictor: GoalPredictor, trajectories: Sequence[Trajectory]) -> str | None:
     """A predictor that peeks at the true goal is perfect and worthless."""
     prefixes = [trajectory.first(1) for trajectory in trajectories]
-    blind = [_with_goal(trajectory, None) for trajectory in prefixes]
+    blind = [replace(trajectory, goal=None) for trajectory in prefixes]
     same = np.allclose(predictor.predict_proba(prefixes), predictor.predict_proba(blind), atol=1e-9)
     return None if same else "the answer depends on the trajectory's goal, which is what it should predict"
-
-
-def _with_goal(trajectory: Trajectory, goal: str | None) -> Trajectory:
-    return Trajectory(
-        states=trajectory.states,
-        times=trajectory.times,
-        start=trajectory.start,
-        goal=goal,
-        candidates=trajectory.candidates,
-        participant=trajectory.participant,
-        condition=trajectory.condition,
-        layout=trajectory.layout,
-        layout_name=trajectory.layout_name,
-        candidate_set=trajectory.candidate_set,
-        complete=trajectory.complete,
-        goal_positions=trajectory.goal_positions,
-    )
 
 
 def _check_stream(predictor: GoalPredictor, trajectory: Trajectory) -> str | None:

@@ -1,4 +1,4 @@
-"""Cross-validation of predictors: each trajectory is judged by one that was not fitted on it."""
+"""Cross-validation of predictors: each trajectory is predicted by one that was not fitted on it."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ def accuracy_at(
     cut: Cut = "steps",
     ties: TieCredit = "fractional",
 ) -> pd.DataFrame:
-    """Judge a fitted predictor on trajectories it has not learned from.
+    """Evaluate a fitted predictor on trajectories it has not learned from.
 
     Args:
         predictor: A fitted predictor.
         X: ``n`` complete trajectories with known goals.
         fractions: ``F`` fractions observed.
-        cut: Fraction of what; see :data:`legible_envs.rollouts.CUTS`.
+        cut: What the fraction is a share of, a key of :data:`legible_envs.rollouts.CUTS`.
         ties: How a true goal that shares the top counts; see :func:`predictors.base.correctness`.
 
     Returns:
@@ -61,7 +61,7 @@ def accuracy_at(
     trajectories = list(X)
     sets = sorted({trajectory.candidate_set for trajectory in trajectories})
     if len(sets) > 1:
-        raise ValueError(f"trajectories with different candidate sets {sets} must be judged apart")
+        raise ValueError(f"trajectories with different candidate sets {sets} must be evaluated apart")
     probabilities = predictor.predict_proba_at(trajectories, fractions, cut)
     table = _rows(trajectories, probabilities, predictor.goal_columns(trajectories), fractions, cut, ties)
     table.attrs.update(cut=cut, definition=CUTS[cut], ties=ties, candidate_set=sets[0] if sets else None)
@@ -118,7 +118,7 @@ def evaluate(
     rare: Literal["error", "keep"] = "error",
     seed: int | np.random.Generator = 0,
 ) -> Evaluation:
-    """Judge predictors by stratified cross-validation: every trajectory is predicted once per repeat, unseen.
+    """Evaluate predictors by stratified cross-validation: every trajectory is predicted once per repeat, unseen.
 
     All predictors see the same splits.
 
@@ -129,11 +129,11 @@ def evaluate(
         cv: Folds, in each of which every goal has its share.
         repeats: How often, with other splits.
         fractions: Fractions observed.
-        cut: Fraction of what; see :data:`legible_envs.rollouts.CUTS`.
+        cut: What the fraction is a share of, a key of :data:`legible_envs.rollouts.CUTS`.
         ties: How a true goal that shares the top counts; see :func:`predictors.base.correctness`.
-        groups: ``"participant"``: nobody is both learned from and judged. None: trajectories are split singly.
-        by: ``"condition"`` or ``"layout"``: learn and judge within each apart, as for comparing layouts.
-        rare: ``"error"`` refuses goals with fewer examples than folds; ``"keep"`` judges them all the same.
+        groups: ``"participant"``: no participant is on both sides of a split. None: trajectories are split singly.
+        by: ``"condition"`` or ``"layout"``: fit and evaluate within each apart, as for comparing layouts.
+        rare: ``"error"`` refuses goals with fewer examples than folds; ``"keep"`` evaluates on them all the same.
         seed: Of the splits.
 
     Returns:
@@ -142,7 +142,7 @@ def evaluate(
     Raises:
         PredictorError: A predictor that cannot be found or made.
         ValueError: Trajectories that cannot be split so, with the reason; unknown options.
-        TypeError: Something else than trajectories.
+        TypeError: Samples that are not trajectories.
     """
     import pandas as pd
     from sklearn.base import clone
@@ -161,10 +161,10 @@ def evaluate(
             except ValueError as error:
                 raise ValueError(f"{by} {part!r}: {error}" if by else str(error)) from error
             for fold, (train, test) in enumerate(splits):
-                learned, judged = ([trajectories[members[i]] for i in half] for half in (train, test))
+                learned, held_out = ([trajectories[members[i]] for i in half] for half in (train, test))
                 for name, predictor in named.items():
                     fitted = clone(predictor).fit(learned)
-                    rows, confusion = _judge(fitted, judged, fractions, cut, ties)
+                    rows, confusion = _predict_rows(fitted, held_out, fractions, cut, ties)
                     rows["trajectory"] = members[test][rows["trajectory"].to_numpy()]
                     labels = {"predictor": name, "repeat": repeat, "fold": fold}
                     tables.append(_labelled(rows, labels))
@@ -223,7 +223,7 @@ def _parts(trajectories: Sequence[Trajectory], by: Part | None) -> dict[str, npt
     return {str(label): np.flatnonzero(labels == label) for label in dict.fromkeys(labels.tolist())}
 
 
-def _judge(
+def _predict_rows(
     predictor: GoalPredictor, trajectories: Sequence[Trajectory], fractions: Sequence[float], cut: Cut, ties: TieCredit
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Rows as of :func:`accuracy_at` with ``confidence``, and confusions as ``fraction, goal, predicted, count``."""
@@ -273,7 +273,7 @@ def learning_curve(
 ) -> LearningCurve:
     """How accuracy grows with the number of trajectories learned from.
 
-    In each repeat a fixed share is held out and judged; training sets are nested, and without groups hold goals in
+    In each repeat a fixed share is held out to evaluate on; training sets are nested, and without groups hold goals in
     proportion.
 
     Args:
@@ -284,14 +284,14 @@ def learning_curve(
         test_share: Share held out.
         repeats: How often, with other splits.
         fractions: Fractions observed.
-        cut: Fraction of what; see :data:`legible_envs.rollouts.CUTS`.
+        cut: What the fraction is a share of, a key of :data:`legible_envs.rollouts.CUTS`.
         ties: As for :func:`evaluate`.
         groups: As for :func:`evaluate`.
         seed: Of the splits.
 
     Raises:
         ValueError: Sizes that are no sizes or larger than what is left to learn from; goals that the smallest training
-            set has not heard of; and as for :func:`evaluate`.
+            set does not mention; and as for :func:`evaluate`.
     """
     import pandas as pd
     from sklearn.base import clone
@@ -306,16 +306,16 @@ def learning_curve(
     # Groups are of different sizes: the smallest pool decides, so that every repeat has the same training sizes.
     counts = _sizes(sizes, min(len(pool) for pool, _ in splits))
     for repeat, (pool, test) in enumerate(splits):
-        judged = [trajectories[i] for i in test]
+        held_out = [trajectories[i] for i in test]
         for size in counts:
             learned = [trajectories[i] for i in pool[:size]]
-            _check_known(learned, judged)
+            _check_known(learned, held_out)
             for name, predictor in named.items():
                 fitted = clone(predictor).fit(learned)
-                probabilities = fitted.predict_proba_at(judged, fractions, cut)
-                correct = correctness(probabilities, fitted.goal_columns(judged), ties).mean(axis=0)
+                probabilities = fitted.predict_proba_at(held_out, fractions, cut)
+                correct = correctness(probabilities, fitted.goal_columns(held_out), ties).mean(axis=0)
                 for fraction, accuracy in zip(fractions, correct, strict=True):
-                    rows.append((name, repeat, size, len(judged), float(fraction), float(accuracy)))
+                    rows.append((name, repeat, size, len(held_out), float(fraction), float(accuracy)))
     columns = ["predictor", "repeat", "size", "judged", "fraction", "accuracy"]
     return LearningCurve(pd.DataFrame(rows, columns=columns), cut, ties, trajectories[0].candidate_set, test_share)
 
@@ -333,8 +333,8 @@ def _sizes(sizes: Sequence[int | float], available: int) -> list[int]:
     return sorted(set(found))
 
 
-def _check_known(learned: Sequence[Trajectory], judged: Sequence[Trajectory]) -> None:
+def _check_known(learned: Sequence[Trajectory], held_out: Sequence[Trajectory]) -> None:
     known = {name for trajectory in learned for name in trajectory.candidates}
-    unknown = sorted({name for trajectory in judged for name in trajectory.candidates} - known)
+    unknown = sorted({name for trajectory in held_out for name in trajectory.candidates} - known)
     if unknown:
         raise ValueError(f"{len(learned)} trajectories to learn from never mention goals {unknown}; use larger sizes")

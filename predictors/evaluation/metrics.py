@@ -77,7 +77,7 @@ def calibration_error(
 def clustered_interval(
     values: npt.NDArray[np.float64], units: npt.NDArray[np.integer], level: float = 0.95
 ) -> tuple[float, float, float]:
-    """A mean and its confidence interval where values of one unit (a person) go together.
+    """A mean and its confidence interval where values of one unit (a participant) depend on each other.
 
     The mean is over values; its variance sums the units' total deviations (cluster-robust, with factor
     ``m/(m-1)`` for ``m`` units) and the quantile is Student's with ``m - 1`` degrees of freedom. With one value per

@@ -1,4 +1,4 @@
-"""Which trajectories are learned from and which are judged."""
+"""Which trajectories a predictor learns from and which it is evaluated on."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ def folds(
     Args:
         trajectories: ``n`` trajectories with known goals.
         cv: Number of folds ``k``.
-        rng: Where the shuffle comes from.
-        groups: ``"participant"`` keeps all trajectories of a person in one fold.
+        rng: Of the shuffle.
+        groups: ``"participant"`` keeps all trajectories of a participant in one fold.
         rare: Whether goals with fewer examples than folds are refused or kept; kept ones are absent from some folds,
-            and a goal's only example is judged without one to learn from.
+            and a goal's only example is evaluated without one to learn from.
 
     Yields:
-        ``k`` pairs of numbers into ``walks``, sorted.
+        ``k`` pairs of numbers into ``trajectories``, sorted.
 
     Raises:
         ValueError: Too few trajectories, goals or participants; see above.
@@ -57,39 +57,39 @@ def folds(
             "keep them with rare='keep'"
         )
     seed = int(rng.integers(2**31))
-    people: list[str] | None = None
+    participants: list[str] | None = None
     if groups is None:
         if min(len(trajectories), max(Counter(goals).values())) < cv:
             raise ValueError(f"no goal has an example for each of the {cv} folds; use fewer folds")
         splitter: Any = StratifiedKFold(cv, shuffle=True, random_state=seed)
     elif groups == "participant":
-        people = [trajectory.participant for trajectory in trajectories]
-        if "" in people:
-            raise ValueError(f"trajectory {people.index('')} names no participant to group by; use groups=None")
-        if len(set(people)) < cv:
-            raise ValueError(f"{cv} folds need at least {cv} participants, got {len(set(people))}")
+        participants = [trajectory.participant for trajectory in trajectories]
+        if "" in participants:
+            raise ValueError(f"trajectory {participants.index('')} names no participant to group by; use groups=None")
+        if len(set(participants)) < cv:
+            raise ValueError(f"{cv} folds need at least {cv} participants, got {len(set(participants))}")
         splitter = StratifiedGroupKFold(cv, shuffle=True, random_state=seed)
     else:
         raise ValueError(f"`groups` must be 'participant' or None, got {groups!r}")
-    for train, test in _quietly(splitter, goals, people):
+    for train, test in _quietly(splitter, goals, participants):
         _check_fold([trajectories[i] for i in train], [trajectories[i] for i in test])
         yield train, test
 
 
-def _quietly(splitter: Any, goals: Sequence[str], people: Sequence[str] | None) -> list[Split]:
+def _quietly(splitter: Any, goals: Sequence[str], participants: Sequence[str] | None) -> list[Split]:
     """The splits, without scikit-learn's warning about rare goals that were asked for."""
     import warnings
 
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="The least populated class")
-        return [(np.sort(a), np.sort(b)) for a, b in splitter.split(np.zeros(len(goals)), list(goals), people)]
+        return [(np.sort(a), np.sort(b)) for a, b in splitter.split(np.zeros(len(goals)), list(goals), participants)]
 
 
 def check_learnable(trajectories: Sequence[Trajectory]) -> list[str]:
     """The goals of trajectories between which there is something to tell apart.
 
     Raises:
-        TypeError: Something else than trajectories.
+        TypeError: Samples that are not trajectories.
         ValueError: None, prefixes, unknown goals, mixed candidate sets, or one goal only.
     """
     if not trajectories:
@@ -99,13 +99,13 @@ def check_learnable(trajectories: Sequence[Trajectory]) -> list[str]:
         if not isinstance(trajectory, Trajectory):
             raise TypeError(f"expected trajectories, got {type(trajectory).__name__} at index {number}")
         if trajectory.goal is None:
-            raise ValueError(f"trajectory {number} has no known goal to judge by")
+            raise ValueError(f"trajectory {number} has no known goal to compare with")
         if not trajectory.complete:
             raise ValueError(f"trajectory {number} is a prefix; give complete trajectories")
         goals.append(trajectory.goal)
     sets = sorted({trajectory.candidate_set for trajectory in trajectories})
     if len(sets) > 1:
-        raise ValueError(f"trajectories with different candidate sets {sets} must be judged apart")
+        raise ValueError(f"trajectories with different candidate sets {sets} must be evaluated apart")
     if len(set(goals)) == 1:
         raise ValueError(f"all {len(goals)} trajectories go to {goals[0]!r}; there is nothing to tell apart")
     return goals
@@ -122,7 +122,7 @@ def _check_fold(train: Sequence[Trajectory], test: Sequence[Trajectory]) -> None
     if unknown:
         raise ValueError(
             f"goals {sorted(unknown)} are candidates only in the held-out part of a fold; use fewer folds, other "
-            "groups, or judge layouts apart with by='layout'"
+            "groups, or evaluate layouts apart with by='layout'"
         )
 
 
@@ -155,11 +155,11 @@ def nested_training_sets(
         order = order[np.argsort(place[order], kind="stable")]
         test, pool = np.sort(order[:count]), order[count:]
     elif groups == "participant":
-        people = [trajectory.participant for trajectory in trajectories]
-        if len(set(people)) < 2:
+        participants = [trajectory.participant for trajectory in trajectories]
+        if len(set(participants)) < 2:
             raise ValueError("grouping by participant needs at least two participants")
         split = GroupShuffleSplit(1, test_size=test_share, random_state=int(rng.integers(2**31)))
-        train, test = next(split.split(np.zeros(len(trajectories)), groups=people))
+        train, test = next(split.split(np.zeros(len(trajectories)), groups=participants))
         pool = order[np.isin(order, train)]
     else:
         raise ValueError(f"`groups` must be 'participant' or None, got {groups!r}")

@@ -1,4 +1,4 @@
-"""Optimal costs between cells and stations of a kitchen, and the base of the predictors that use them."""
+"""Costs-to-go to the stations of a kitchen, Bayesian goal inference from them, and the base of grid predictors."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ def remaining_steps(layout: OvercookedLayout, goals: tuple[str, ...]) -> npt.NDA
     """Optimal number of steps from every cell into each goal station.
 
     People walk on floor cells and reach into the station with a last step, so that a cell beside a station is one step
-    away from it. A station that has been entered is left for no other: its own cell is 0 from itself.
+    away from it. A station is a dead end: its own cell is 0 from itself and infinitely far from all others.
 
     Args:
         layout: The kitchen.
         goals: ``K`` names of stations.
 
     Returns:
-        ``(H, W, K)`` read-only, ``inf`` where there is no way.
+        ``(H, W, K)`` read-only, ``inf`` where there is no path.
 
     Raises:
         LayoutError: A goal is not a station of this kitchen.
@@ -45,16 +45,16 @@ def remaining_steps(layout: OvercookedLayout, goals: tuple[str, ...]) -> npt.NDA
 
 
 def check_trajectory(trajectory: Trajectory) -> OvercookedLayout:
-    """The kitchen of a walk whose cells it fits.
+    """The kitchen of a trajectory, after checking that the states fit it.
 
     Raises:
-        ValueError: No layout, positions instead of cells, or a cell where nobody can be (named).
+        ValueError: No layout, positions instead of cells, or a state outside the floor (named).
     """
     layout = trajectory.layout
     if layout is None:
         raise ValueError("this predictor needs the layout of a trajectory; this one has none")
     if not isinstance(layout, OvercookedLayout):
-        raise ValueError(f"this predictor reads walks in kitchens; this trajectory has a {type(layout).__name__}")
+        raise ValueError(f"this predictor is for trajectories in kitchens; this one has a {type(layout).__name__}")
     if trajectory.num_states and (not trajectory.is_grid or trajectory.states.shape[1] != 2):
         raise ValueError(
             f"expected (row, col) cells, got {trajectory.states.shape[1]}-d {trajectory.states.dtype} states"
@@ -63,8 +63,8 @@ def check_trajectory(trajectory: Trajectory) -> OvercookedLayout:
     for index, (row, col) in enumerate(trajectory.states.tolist()):
         if (row, col) not in floor and (index < last or layout.station_at((row, col)) not in trajectory.candidates):
             raise ValueError(
-                f"the walk does not fit the layout: state {index}, row {row}, column {col} is neither floor nor, as "
-                "the last state, a candidate station"
+                f"the trajectory does not fit the layout: state {index}, row {row}, column {col} is neither floor nor, "
+                "as the last state, a candidate station"
             )
     return layout
 
@@ -76,29 +76,29 @@ def _floor_of(layout: OvercookedLayout) -> frozenset[tuple[int, int]]:
 
 
 def check_complete(trajectory: Trajectory, number: int) -> OvercookedLayout:
-    """The kitchen of a whole walk: a known goal, no jumps, from a floor cell into the goal station.
+    """The kitchen of a complete trajectory: a known goal, no jumps, from a floor cell into the goal station.
 
     Args:
-        trajectory: The walk.
-        number: Its number, for messages.
+        trajectory: The trajectory.
+        number: Its number, for error messages.
 
     Raises:
         ValueError: Anything else (naming the cell).
     """
     layout = check_trajectory(trajectory)
     if trajectory.goal is None or not trajectory.complete:
-        raise ValueError(f"learning needs complete walks with known goals; trajectory {number} is not one")
+        raise ValueError(f"learning needs complete trajectories with known goals; trajectory {number} is not one")
     cells = trajectory.states
     if len(cells) < 2 or layout.station_at(cells[-1]) != trajectory.goal:
         raise ValueError(
-            f"a complete walk ends with the cell of its goal station after one floor cell or more; trajectory {number} "
-            f"to {trajectory.goal!r} has the states {cells.tolist()}"
+            f"a complete trajectory ends with the cell of its goal station after one floor cell or more; trajectory "
+            f"{number} to {trajectory.goal!r} has the states {cells.tolist()}"
         )
     jumps = np.flatnonzero(np.abs(np.diff(cells, axis=0)).sum(axis=1) != 1)
     if len(jumps):
         (row, col), (to_row, to_col) = cells[jumps[0]].tolist(), cells[jumps[0] + 1].tolist()
         raise ValueError(
-            f"the walk does not fit the layout: trajectory {number} goes from row {row}, column {col} to row {to_row}, "
+            f"trajectory {number} does not fit its layout: it goes from row {row}, column {col} to row {to_row}, "
             f"column {to_col}, which is not one step"
         )
     return layout
@@ -107,10 +107,10 @@ def check_complete(trajectory: Trajectory, number: int) -> OvercookedLayout:
 def goal_posterior(
     trajectory: Trajectory, prior: npt.NDArray[np.float64], goal_costs: GoalCosts
 ) -> npt.NDArray[np.float64]:
-    """Eq. 1: ``P(G) exp(C*(S->G) - C*(Q->G))``, normalised.
+    """Bayesian goal inference (Eq. 1): ``P(G) exp(C*(S->G) - C*(Q->G))``, normalised.
 
     Args:
-        trajectory: What was observed.
+        trajectory: The observed prefix.
         prior: ``(K,)`` probabilities of its candidates.
         goal_costs: Optimal costs in nats, ``(H, W, K)`` for a layout and names of goals.
 
@@ -118,7 +118,7 @@ def goal_posterior(
         ``(K,)`` probabilities of its candidates; the prior if nothing was observed.
 
     Raises:
-        ValueError: A walk that does not fit its layout, or a candidate that cannot be reached from its first cell.
+        ValueError: A trajectory that does not fit its layout, or a candidate out of reach from its first cell.
     """
     layout = check_trajectory(trajectory)
     if not trajectory.num_states:
@@ -130,14 +130,14 @@ def goal_posterior(
         goal = trajectory.candidates[int(np.isinf(optimal).argmax())]
         raise ValueError(f"the candidate {goal!r} cannot be reached from row {first_row}, column {first_col}")
     excess = costs[row, col] - optimal
-    possible = np.isfinite(excess)  # nobody inside a station walks on to another
+    possible = np.isfinite(excess)  # no path leads out of a station
     weights = np.zeros(len(prior))
     weights[possible] = prior[possible] * np.exp(excess[possible].min() - excess[possible])
     return weights / weights.sum()
 
 
 class GridStream(GoalStream):
-    """A belief about someone walking on a grid; each cell is checked once, by the predictor."""
+    """The belief about one person on a grid; each cell is checked once, by the predictor."""
 
     def _observed(self) -> Trajectory:
         if not self._points:
@@ -146,14 +146,14 @@ class GridStream(GoalStream):
 
 
 class GridPredictor(GoalPredictor):
-    """A predictor that looks at one walk at a time; subclasses define ``candidate_probabilities``."""
+    """A predictor that takes one trajectory at a time; subclasses define ``candidate_probabilities``."""
 
     @abstractmethod
     def candidate_probabilities(self, trajectory: Trajectory) -> npt.NDArray[np.float64]:
-        """``(len(trajectory.candidates),)`` probabilities in the order of the walk's candidates."""
+        """``(len(trajectory.candidates),)`` probabilities in the order of the candidates."""
 
     def stream(self, context: Trajectory) -> GridStream:
-        """Watch one person as they move; see :meth:`GoalPredictor.stream`."""
+        """Predict one person's goal while they move; see :meth:`GoalPredictor.stream`."""
         return GridStream(self, context)
 
     def predict_proba(self, X: Sequence[Trajectory]) -> npt.NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""Prefixes of walks as numbers, and the base of the predictors that learn from them without a model of people."""
+"""Prefixes of trajectories as feature vectors, and the base of the baselines that learn from them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class PrefixEncoder:
     goal how much nearer it has come per step taken (1: straight toward it, -1: straight away).
 
     Args:
-        trajectories: Complete walks whose stations and cells the one-hot features are for; others are zero.
+        trajectories: Complete trajectories; their stations and cells define the one-hot features, others are zero.
         classes: ``(K,)`` names of goals.
     """
 
@@ -45,7 +45,7 @@ class PrefixEncoder:
         self.width = len(self._index) + 1 + len(self._classes)
 
     def encode(self, trajectory: Trajectory, cells: Steps) -> Floats:
-        """``(width,)`` features of the first cells of a walk, at least one."""
+        """``(width,)`` features of the first cells of a trajectory, at least one."""
         layout, row = _layout_of(trajectory), np.zeros(self.width)
         for key, value in _one_hot(self._places.get(layout, -1), trajectory.start, cells):
             column = self._index.get(key)
@@ -67,7 +67,7 @@ def _layout_of(trajectory: Trajectory) -> OvercookedLayout:
 
 
 def _one_hot(place: int, start: str, cells: Steps) -> list[tuple[tuple[object, ...], float]]:
-    """What is the case, and how much; ``place`` numbers the kitchen."""
+    """Names and values of the features that are not zero; ``place`` is the number of the kitchen."""
     values: list[tuple[tuple[object, ...], float]] = [
         (("start", place, start), 1.0),
         (("first", place, cells[0]), 1.0),
@@ -81,16 +81,21 @@ def _one_hot(place: int, start: str, cells: Steps) -> list[tuple[tuple[object, .
 
 
 class PrefixPredictor(GridPredictor):
-    """Learns from all prefixes of complete walks; subclasses define ``_learn`` and ``_read``.
+    """Learns from all prefixes of complete trajectories; subclasses define ``_learn`` and ``_weigh``.
 
-    Nothing observed: the prior, as often as each goal was chosen. Someone inside a candidate station has reached it.
+    With nothing observed the belief is the prior: as often as each goal was chosen. A person inside a candidate station
+    has reached it.
+
+    Attributes:
+        classes_: ``(K,)`` names of all goals and candidates seen in ``fit``, sorted.
     """
 
     def fit(self, X: Sequence[Trajectory], y: object = None) -> Self:
-        """Learn from complete walks.
+        """Learn from complete trajectories.
 
         Raises:
-            ValueError: No walks, prefixes, walks that do not fit their layout (naming the cell), or bad parameters.
+            ValueError: No trajectories, prefixes, trajectories that do not fit their layout (naming the cell), or bad
+                parameters.
         """
         self._check_parameters()
         super().fit(X, y)
@@ -98,6 +103,7 @@ class PrefixPredictor(GridPredictor):
         for number, trajectory in enumerate(trajectories):
             check_complete(trajectory, number)
         self._prior = GoalPrior("empirical", trajectories, self.classes_)
+        self._prior_weights = self._prior.of(self.classes_.tolist())
         self._learn(trajectories)
         return self
 
@@ -106,17 +112,17 @@ class PrefixPredictor(GridPredictor):
 
     @abstractmethod
     def _learn(self, trajectories: Sequence[Trajectory]) -> None:
-        """Learn from checked walks."""
+        """Learn from checked trajectories; ``_prior_weights`` is the ``(K,)`` prior of all goals."""
 
     @abstractmethod
-    def _read(self, trajectory: Trajectory, cells: Steps) -> Floats:
+    def _weigh(self, trajectory: Trajectory, cells: Steps) -> Floats:
         """``(K,)`` weights of all goals >= 0 in the order of ``classes_``, given at least one floor cell."""
 
     def candidate_probabilities(self, trajectory: Trajectory) -> Floats:
-        """``(len(trajectory.candidates),)`` probabilities in the order of the walk's candidates.
+        """``(len(trajectory.candidates),)`` probabilities in the order of the candidates.
 
         Raises:
-            ValueError: A walk that does not fit its layout.
+            ValueError: A trajectory that does not fit its layout.
         """
         layout = check_trajectory(trajectory)
         missing = [name for name in trajectory.candidates if name not in layout.stations]
@@ -131,7 +137,7 @@ class PrefixPredictor(GridPredictor):
         reached = layout.station_at(cells[-1])
         if reached is not None:
             return np.array([float(name == reached) for name in trajectory.candidates])
-        weights = self._read(trajectory, cells)[self.candidate_columns(trajectory)]
+        weights = self._weigh(trajectory, cells)[self.candidate_columns(trajectory)]
         total = weights.sum()
         return weights / total if total > 0 else prior
 
@@ -139,16 +145,16 @@ class PrefixPredictor(GridPredictor):
 def distinct_prefixes(
     trajectories: Sequence[Trajectory], encoder: PrefixEncoder, classes: npt.NDArray[np.str_]
 ) -> tuple[Floats, Floats]:
-    """All prefixes of walks, equal ones once.
+    """All prefixes of trajectories, equal ones once.
 
     Args:
-        trajectories: Complete walks.
+        trajectories: Complete trajectories.
         encoder: Of their prefixes.
         classes: ``(K,)`` names of goals.
 
     Returns:
-        ``(U, width)`` features, and ``(U, K)`` weights: how many walks to each goal have this prefix, each counting by
-        the share of it that one cell is: who is judged at fractions observed meets the cells of short walks more often.
+        ``(U, width)`` features, and ``(U, K)`` weights: how many trajectories to each goal have this prefix. Each
+        counts by the share of it that one cell is: at fractions observed, cells of short ones are met more often.
     """
     column = {name: number for number, name in enumerate(classes.tolist())}
     rows: dict[tuple[object, ...], int] = {}

@@ -1,4 +1,4 @@
-"""What is believed before a person moves."""
+"""The probabilities of goals before anything is observed."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ PRIORS: Final = ("uniform", "empirical")
 class GoalPrior:
     """Probabilities of goals before anything is observed.
 
-    ``"uniform"``: all candidates alike. ``"empirical"``: as often as each was chosen where it could be, one more
-    choice of each goal added (Laplace), so that a goal that was never chosen stays possible.
+    ``"uniform"``: all candidates alike. ``"empirical"``: as often as each was chosen when it was a candidate, with one
+    more choice of each goal added (Laplace), so that a goal that was never chosen stays possible.
 
     Args:
         kind: ``"uniform"`` or ``"empirical"``.
-        trajectories: Trajectories to count goals in; those without a known goal are passed over.
+        trajectories: Trajectories to count goals in; those without a known goal are skipped.
         classes: ``(K,)`` names of all goals.
 
     Raises:

@@ -1,4 +1,4 @@
-"""The heuristic that a person reaches for what is nearest."""
+"""The heuristic that people go for the nearest goal."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ Metric = Literal["manhattan", "geodesic", "euclidean"]
 class ShortestDistance(GridPredictor):
     r"""Predicts the candidate nearest to where the person is now; equally near ones share the probability.
 
-    The baseline of Tung et al. (HRI 2024). It knows neither the start nor the way so far. With nothing observed yet
+    The baseline of Tung et al. (HRI 2024). It uses neither the start nor the path so far. With nothing observed yet
     all candidates are equally probable.
 
     Args:
         metric: ``"manhattan"``: rows plus columns to the station, through walls. ``"geodesic"``: steps of the shortest
-            way into the station. ``"euclidean"``: the straight line, for reaches, to where a trajectory's
-            ``goal_positions`` say or else reaches ended in ``fit``.
+            path into the station. ``"euclidean"``: the straight line, for reaches, to the trajectory's
+            ``goal_positions`` or else to where reaches ended in ``fit``.
 
     Attributes:
         classes_: ``(K,)`` names of all goals and candidates seen in ``fit``, sorted.
@@ -36,8 +36,8 @@ class ShortestDistance(GridPredictor):
         >>> from legible_envs.overcooked import OvercookedLayout
         >>> from legible_envs.rollouts import Trajectory
         >>> kitchen = OvercookedLayout.from_ascii("XOXXXTX\nX     X\nXXXSXXX")
-        >>> walk = Trajectory([(1, 3), (1, 2)], goal="onion", candidates=("onion", "tomato"), layout=kitchen)
-        >>> ShortestDistance().fit([walk]).predict_proba([walk.first(1), walk]).tolist()
+        >>> trajectory = Trajectory([(1, 3), (1, 2)], goal="onion", candidates=("onion", "tomato"), layout=kitchen)
+        >>> ShortestDistance().fit([trajectory]).predict_proba([trajectory.first(1), trajectory]).tolist()
         [[0.5, 0.5], [1.0, 0.0]]
     """
 
@@ -51,10 +51,10 @@ class ShortestDistance(GridPredictor):
         return self
 
     def candidate_probabilities(self, trajectory: Trajectory) -> npt.NDArray[np.float64]:
-        """``(len(trajectory.candidates),)`` probabilities in the order of the walk's candidates.
+        """``(len(trajectory.candidates),)`` probabilities in the order of the candidates.
 
         Raises:
-            ValueError: An unknown metric, or a walk that does not fit its layout.
+            ValueError: An unknown metric, or a trajectory that does not fit its layout.
         """
         if self.metric not in ("manhattan", "geodesic", "euclidean"):
             raise ValueError(f"`metric` must be 'manhattan', 'geodesic' or 'euclidean', got {self.metric!r}")

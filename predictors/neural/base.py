@@ -1,4 +1,4 @@
-"""What all neural predictors share: fitting, beliefs after every prefix, watching one person, and files."""
+"""What all neural predictors share: fitting, beliefs after every prefix, streams, and files."""
 
 from __future__ import annotations
 
@@ -44,9 +44,9 @@ class NeuralPredictor(GoalPredictor):
         dropout: Share of each layer's outputs set to zero while training.
         batch_size: Trajectories per step.
         max_epochs: Most passes over the data.
-        patience: Passes without a better held-out loss after which a member is done.
+        patience: Passes without a lower held-out loss after which a member stops.
         validation_fraction: Share each member holds out; 0 holds out nothing (as where that would be less than two).
-        device: ``"auto"`` (a GPU if there is one), ``"cpu"``, ``"cuda"``, ….
+        device: ``"auto"`` (a GPU where there is one), ``"cpu"``, ``"cuda"``, ….
         random_state: Seed.
 
     Attributes:
@@ -141,17 +141,17 @@ class NeuralPredictor(GoalPredictor):
     def predict_proba_at(
         self, X: Sequence[Trajectory], fractions: Sequence[float] = FRACTIONS, cut: Cut = "steps"
     ) -> npt.NDArray[np.float64]:
-        """See :meth:`GoalPredictor.predict_proba_at`; each trajectory is read once, as the networks are causal."""
+        """See :meth:`GoalPredictor.predict_proba_at`; one pass over each trajectory, as the networks are causal."""
         trajectories = check_trajectories(X)
         lengths = [[trajectory.prefix_length(fraction, cut) for fraction in fractions] for trajectory in trajectories]
-        read = self._beliefs(
+        after = self._beliefs(
             [trajectory.first(max(row, default=0)) for trajectory, row in zip(trajectories, lengths, strict=True)]
         )
-        rows = [beliefs[row] for beliefs, row in zip(read, lengths, strict=True)]
+        rows = [beliefs[row] for beliefs, row in zip(after, lengths, strict=True)]
         return np.array(rows, dtype=np.float64).reshape(len(trajectories), len(fractions), len(self.classes_))
 
     def stream(self, context: Trajectory) -> NeuralStream:
-        """Watch one person as they move, keeping what the networks remember; see :meth:`GoalPredictor.stream`."""
+        """Predict one person's goal while they move, keeping the networks' state; see :meth:`GoalPredictor.stream`."""
         return NeuralStream(self, context)
 
     # -- files --------------------------------------------------------------------------------------------------------
@@ -181,7 +181,7 @@ class NeuralPredictor(GoalPredictor):
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
-        """Read a predictor back; needs no torch, and runs nothing that is in the file.
+        """Read a predictor back; needs no torch and runs no code from the file.
 
         Raises:
             FileNotFoundError: No such file.
@@ -312,7 +312,7 @@ class NeuralPredictor(GoalPredictor):
 
 
 class NeuralStream(GoalStream):
-    """A neural predictor's belief about one person, which goes on from what the networks remember.
+    """A neural predictor's belief about one person, which goes on from the networks' state.
 
     Each update runs the networks on one state: recurrent ones carry their hidden vectors, transformers their keys and
     values.
@@ -341,14 +341,14 @@ class NeuralStream(GoalStream):
             return
         try:
             self._advance()
-        except ValueError:  # a point that does not fit is not part of the way
+        except ValueError:  # a refused point is not part of the trajectory
             del self._points[count:], self._times[count:]
             raise
 
     def _advance(self) -> None:
         predictor = self._neural
         recent = np.array([self._points[0], *self._points[-2:]])
-        if len(self._points) < 3:  # most checks are of the kind of points, and one kind is one kind
+        if len(self._points) < 3:  # the kind of points cannot change later
             predictor.encoding_.check(self._observed())
         if self._context.layout is not None and predictor.encoding_.grid:
             check_trajectory(self._observed())

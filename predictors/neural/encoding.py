@@ -1,4 +1,4 @@
-"""What a network sees of a trajectory: one row of numbers for every state, from that state and earlier ones only."""
+"""The inputs of the networks: one row of numbers for every state, from that state and earlier ones only."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ class Encoding:
         return 2 * self.dimension + cells + len(self.starts) + len(self.layouts)
 
     def check(self, trajectory: Trajectory) -> None:
-        """Say whether a trajectory is of the kind that was learned.
+        """Check that a trajectory is of the kind that was learned.
 
         Raises:
             ValueError: It is not.

@@ -1,4 +1,4 @@
-"""Where goals are, for reaches: told by the trajectory, or learned from where earlier reaches ended."""
+"""Where the goals of reaches are: given by the trajectory, or learned from where earlier reaches ended."""
 
 from __future__ import annotations
 
@@ -41,7 +41,8 @@ def goal_places(trajectory: Trajectory, learned: Places) -> npt.NDArray[np.float
         learned: What :func:`learn_places` found, for the others.
 
     Raises:
-        ValueError: A candidate whose place nobody told and no reach ended at, or another dimension than the states'.
+        ValueError: A candidate without a place (no ``goal_positions``, and no reach in ``fit`` ended there), or places
+            of another dimension than the states.
     """
     if trajectory.goal_positions is not None:
         return np.array(trajectory.goal_positions)
@@ -84,7 +85,7 @@ class PlacePredictor(GoalPredictor):
         """``(n,)`` weights >= 0, not all 0, of goals at ``(n, d)`` places after ``(T, d)`` states, T >= 1."""
 
     def weigh_trajectory(self, trajectory: Trajectory) -> npt.NDArray[np.float64]:
-        """``(n,)`` weights of a reach's candidates after at least one state; for subclasses that look at more."""
+        """``(n,)`` weights of the candidates after at least one state, for subclasses that use more than the states."""
         return self.weigh(trajectory.states, goal_places(trajectory, self.places_))
 
     def predict_proba(self, X: Sequence[Trajectory]) -> npt.NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""Plain classifiers of the hand's position, velocity and time: what a predictor of reaches must beat."""
+"""Baselines for reaches: plain classifiers of the hand's position, velocity and time."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ __all__ = ["ReachLogistic", "ReachNeighbours"]
 
 
 class _MomentClassifier(GoalPredictor):
-    """Learns from every moment of every reach, and looks at the newest moment only.
+    """Learns from every moment of every reach, and predicts from the newest moment only.
 
-    The features are the position and velocity relative to the start, and the time since. Goals that are no candidates
-    are masked; with no or one position observed the belief is how often each goal was reached in ``fit``.
+    The features are the position and velocity relative to the start, and the time since. Goals that are not
+    candidates are masked; with no or one position observed the belief is how often each goal was reached in ``fit``.
     """
 
     def fit(self, X: Sequence[Trajectory], y: object = None) -> Self:
@@ -53,7 +53,7 @@ class _MomentClassifier(GoalPredictor):
         """An unfitted classifier for so many moments."""
 
     def _smoothed(self, weights: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        """``(n, G)`` probabilities of the classifier, as they are unless it is surer than it can be."""
+        """``(n, G)`` probabilities of the classifier, for subclasses that smooth them."""
         return weights
 
     def predict_proba(self, X: Sequence[Trajectory]) -> npt.NDArray[np.float64]:
@@ -84,7 +84,7 @@ class _MomentClassifier(GoalPredictor):
     def _beliefs(
         self, trajectories: Sequence[Trajectory], rows: Sequence[npt.NDArray[np.float64] | None]
     ) -> npt.NDArray[np.float64]:
-        """``(n, C)`` beliefs; None for a walk stands for nothing known."""
+        """``(n, C)`` beliefs; a row of None stands for nothing observed."""
         columns = [self.candidate_columns(trajectory) for trajectory in trajectories]
         weights = np.tile(self.prior_, (len(trajectories), 1))
         seen = [i for i, row in enumerate(rows) if row is not None]
@@ -96,7 +96,7 @@ class _MomentClassifier(GoalPredictor):
             full = np.zeros(len(self.classes_))
             full[places] = weights[i]
             chosen = full[candidates]
-            if chosen.sum() <= 0:  # the classifier is sure of a goal that is no candidate, or none was ever reached
+            if chosen.sum() <= 0:  # all probability is on other goals, or no candidate was ever reached
                 full[places] = self.prior_
                 chosen = full[candidates] if full[candidates].any() else np.ones(len(candidates))
             probabilities[i, candidates] = chosen / chosen.sum()
@@ -108,7 +108,7 @@ class ReachLogistic(_MomentClassifier):
 
     Args:
         C: Inverse strength of the L2 penalty on standardised features.
-        degree: 1: the features. 2: also their squares and products: better, and ten times slower to fit.
+        degree: 1: the features. 2: also their squares and products: more accurate, and ten times slower to fit.
         max_iter: Most iterations; scikit-learn warns where they were not enough.
 
     Attributes:
@@ -136,10 +136,10 @@ class ReachLogistic(_MomentClassifier):
 class ReachNeighbours(_MomentClassifier):
     """The goals of the most similar moments of earlier reaches, by standardised position, velocity and time.
 
-    The prior votes like one more neighbour, so that nothing is impossible because few moments were asked.
+    The prior votes like one more neighbour, so that few neighbours never make a goal impossible.
 
     Args:
-        n_neighbors: How many moments vote; all if there are fewer.
+        n_neighbors: Number of moments that vote; all if there are fewer.
 
     Attributes:
         classes_: ``(C,)`` names of all goals and candidates seen in ``fit``, sorted.

@@ -104,8 +104,8 @@ def check_reaches(trajectories: Sequence[Trajectory]) -> int:
             )
         if trajectory.states.shape[1] != trajectories[0].states.shape[1]:
             raise ValueError(
-                f"all reaches must have one dimension; reach 0 has {trajectories[0].states.shape[1]}, reach {number} has "
-                f"{trajectory.states.shape[1]}"
+                f"all reaches must have one dimension; reach 0 has {trajectories[0].states.shape[1]}, reach {number} "
+                f"has {trajectory.states.shape[1]}"
             )
     return int(trajectories[0].states.shape[1])
 

@@ -1,4 +1,4 @@
-"""The time-series Gaussian: reaches to one goal look alike at the same moment."""
+"""The time-series Gaussian: at the same moment, reaches to one goal are alike."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ class TimeSeriesGaussian(GoalPredictor):
     For every goal, its reaches are resampled to ``n_samples`` steps and aligned in time; each step has a mean and a
     covariance over reaches. A person's motion is aligned to each goal's mean online, and goals are weighed by the mean
     log-density of the samples so far, with a uniform prior (Perez-D'Arpino and Shah, ICRA 2015, as used by Tung et al.,
-    HRI 2024). All positions are relative to the reach's first, which therefore tells nothing by itself: with no or one
+    HRI 2024). All positions are relative to the reach's first, which therefore carries no information: with no or one
     position observed the belief is the prior.
 
-    A goal reached once borrows the covariance of the others (the floor alone if there is none); a goal that was a
-    candidate and never reached gets no probability beside goals that were.
+    A goal reached once borrows the covariance of the others (the floor alone if there is none). A candidate that was
+    never reached in ``fit`` gets no probability beside candidates that were.
 
     Args:
         n_samples: Steps K of the mean reach.
@@ -44,17 +44,17 @@ class TimeSeriesGaussian(GoalPredictor):
         online: Which step of a goal's mean a sample is compared with: ``"open-end"``: by warping the samples so far to
             a beginning of the mean. ``"index"``: by the time since the first sample, in units of the mean duration of
             reaches to the goal. ``"fraction"``: by the share of the reach's own duration, as in the paper; this needs
-            the duration of a reach that is still going on, so that only :meth:`predict_proba_at` and complete
-            trajectories can be asked.
+            the whole duration, so it works only with complete trajectories and :meth:`predict_proba_at`, not while a
+            reach is going on.
         band: How far warping may move a sample from where the clock says, as a share of the reach, offline and online;
             None: anywhere.
         floor: Standard deviation added to every position, in metres.
         velocity_floor: The same for velocities, in metres per second.
         half_life: Seconds after which a sample counts half; None: all samples count the same; 0: only the newest.
 
-    On 1,258 real pointing movements to ten targets by 53 people (mean accuracy over 10..90 %, people held out) the
-    defaults read .71, ``online="index"`` .73, with ``velocity=True`` .75, and ``velocity=True, half_life=0`` .78 in
-    either mode: old samples mostly repeat what the newest one knows.
+    On 1,258 real pointing movements to ten targets by 53 participants (mean accuracy over 10..90 %, participants
+    held out) the defaults reach .71, ``online="index"`` .73, with ``velocity=True`` .75, and ``velocity=True,
+    half_life=0`` .78 in either mode: old samples mostly repeat the information in the newest one.
 
     Attributes:
         classes_: ``(C,)`` names of all goals and candidates seen in ``fit``, sorted.
@@ -66,9 +66,9 @@ class TimeSeriesGaussian(GoalPredictor):
 
     Example:
         >>> from legible_envs.rollouts import Trajectory
-        >>> way = np.linspace(0, 1, 20)[:, None]
+        >>> progress = np.linspace(0, 1, 20)[:, None]
         >>> ends = {"a": (-1, 1), "b": (1, 1)}
-        >>> reach = {g: Trajectory(way * end, goal=g, candidates=("a", "b")) for g, end in ends.items()}
+        >>> reach = {g: Trajectory(progress * end, goal=g, candidates=("a", "b")) for g, end in ends.items()}
         >>> gaussian = TimeSeriesGaussian().fit(list(reach.values()))
         >>> gaussian.predict([reach["a"].first(8), reach["b"].first(8)]).tolist()
         ['a', 'b']
@@ -179,7 +179,7 @@ class TimeSeriesGaussian(GoalPredictor):
         """See :meth:`GoalPredictor.predict_proba`.
 
         Raises:
-            ValueError: Also a prefix if ``online="fraction"``, which needs to know the duration.
+            ValueError: Also a prefix if ``online="fraction"``, which needs the whole duration.
         """
         trajectories = check_trajectories(X)
         columns = [self.candidate_columns(trajectory) for trajectory in trajectories]
@@ -187,7 +187,7 @@ class TimeSeriesGaussian(GoalPredictor):
         for row, trajectory in enumerate(trajectories):
             if self.online == "fraction" and not trajectory.complete and trajectory.num_states > 1:
                 raise ValueError(
-                    "online='fraction' needs the duration of the whole reach, which a prefix does not tell; use "
+                    "online='fraction' needs the duration of the whole reach, which a prefix lacks; use "
                     "`predict_proba_at`, or online='open-end' for motion that is still going on"
                 )
             duration = float(trajectory.times[-1] - trajectory.times[0]) if trajectory.num_states else 0.0
@@ -212,10 +212,10 @@ class TimeSeriesGaussian(GoalPredictor):
         return probabilities
 
     def stream(self, context: Trajectory) -> GoalStream:
-        """See :meth:`GoalPredictor.stream`; an update takes the same time however long the reach has lasted.
+        """See :meth:`GoalPredictor.stream`; an update takes the same time at every length of the reach.
 
         Raises:
-            ValueError: ``online="fraction"``, which cannot be asked while a reach is going on.
+            ValueError: ``online="fraction"``, which is not causal.
         """
         if self.online == "fraction":
             raise ValueError("online='fraction' needs the duration of the whole reach; stream with online='open-end'")

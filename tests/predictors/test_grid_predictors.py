@@ -341,7 +341,7 @@ def test_bad_input_is_refused_in_words(predictor: GoalPredictor) -> None:
     if "learned" in repr(predictor) or "fit" in repr(predictor) or not isinstance(predictor, BayesianGoalPredictor):
         with pytest.raises(ValueError, match="row 3, column 2 to row 1, column 2"):
             clone(predictor).fit([*walks, jump])
-        with pytest.raises(ValueError, match="complete walks with known goals"):
+        with pytest.raises(ValueError, match="complete trajectories with known goals"):
             clone(predictor).fit([*walks, walks[0].first(2)])
         with pytest.raises(ValueError, match="state 1, row 2, column 2"):
             clone(predictor).fit([*walks, wrong])

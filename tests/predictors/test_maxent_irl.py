@@ -16,7 +16,7 @@ from legible_envs.overcooked import OvercookedLayout
 from legible_envs.rollouts import Trajectory
 from predictors import BayesianGoalPredictor, MaxEntIRL, check_predictor
 from predictors.checks import example_trajectories
-from predictors.grid.graphs import station_costs, soft_costs, walk_graph
+from predictors.grid.graphs import soft_costs, station_costs, walk_graph
 from predictors.grid.walk_kernels import factorise, solve, solve_transposed
 from predictors.grid.walk_likelihood import MOST_RATIONAL, best_uniform_cost, collect_evidence
 
@@ -367,7 +367,7 @@ def test_features_are_shared_by_kitchens() -> None:
     new = OvercookedLayout.from_ascii("XOXTX\nX   X\nXV  D\nX   X\nXXSPX")
     map_ = irl.cost_map(new)
     assert map_[3, 1] - map_[3, 3] == pytest.approx(weight)
-    with pytest.raises(ValueError, match="say which of the 2 kitchens"):
+    with pytest.raises(ValueError, match="one of the 2 kitchens"):
         irl.draw_reward()
     assert irl.draw_reward(new).dtype == np.uint8
     # One matrix serves all kitchens of a shape. Positions written out say what "position" says, but for the level.
@@ -429,8 +429,8 @@ def test_bad_walks_and_parameters_are_refused_in_words() -> None:
 
     cases = [
         (changed([(3, 2), (1, 2), (1, 1), (0, 1)]), "row 3, column 2 to row 1, column 2, which is not one step"),
-        (changed([(3, 2), (2, 2)], None), "complete walks with known goals"),
-        (changed([(3, 2), (2, 2)], complete=False), "complete walks with known goals"),
+        (changed([(3, 2), (2, 2)], None), "complete trajectories with known goals"),
+        (changed([(3, 2), (2, 2)], complete=False), "complete trajectories with known goals"),
         (changed([(3, 2), (2, 2)]), "ends with the cell of its goal station"),
         (changed([(0, 1)]), "after one floor cell or more"),
         (changed([(3, 2), (4, 2), (0, 1)]), "state 1, row 4, column 2 is neither floor"),
