@@ -190,9 +190,7 @@ def _verdict(comparison: Comparison) -> str:
 # -- files ------------------------------------------------------------------------------------------------------------
 
 
-def write_evaluation(
-    results: PredictionResults, folder: Path, *, title: str = "Goal prediction"
-) -> list[Path]:
+def write_evaluation(results: PredictionResults, folder: Path, *, title: str = "Goal prediction") -> list[Path]:
     """Write tidy tables (CSV), figures (SVG), ``reading.json`` and a page ``report.html`` into a folder.
 
     Returns:

@@ -70,7 +70,7 @@ def run_benchmark(
             ("searching tables", lambda: table_searching(settings)),
             ("playing at tables", lambda: table_games(settings)),
             ("drawing tables", lambda: table_drawing(settings)),
-            ("people at tables", lambda: table_people(settings)),
+            ("participants at tables", lambda: table_people(settings)),
             ("predicting reaches", lambda: reach_speed(settings)),
             ("predicting in kitchens", lambda: prediction_speed(settings, running, remarks)),
             ("evaluating predictors", lambda: evaluation_speed(settings)),

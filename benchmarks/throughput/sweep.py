@@ -32,7 +32,7 @@ class Settings:
         table_obstacles: How many obstacles they have, one figure each.
         table_climbs: Random tables, and climbs, of the searches for tables; by default those of the paper.
         table_episodes: Episodes at tables that are replayed.
-        table_people: Simulated people per call.
+        table_people: Simulated participants per call.
     """
 
     rounds: int = 7

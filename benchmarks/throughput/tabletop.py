@@ -228,5 +228,5 @@ def table_people(settings: Settings) -> list[Figure]:
         return settings.table_people
 
     samples = alternate({"table people": lambda: rate(simulate, settings.seconds)}, settings.rounds)
-    what = "simulated people who do the whole task round 4 obstacles"
+    what = "simulated participants who do the whole task round 4 obstacles"
     return [Figure("table people", what, "/s", samples["table people"])]

@@ -80,7 +80,7 @@ def station_costs(
         layout: The kitchen.
         goals: ``K`` names of stations.
         cell_costs: ``(H, W)`` of entering each cell; entering the station is free. Negative ones are allowed where no
-            round trip pays.
+            cycle has a negative cost.
 
     Returns:
         ``(H, W, K)``, ``inf`` where there is no path. A station's own cell is 0 from itself.
