@@ -152,10 +152,7 @@ def evaluation_speed(settings: Settings) -> list[Figure]:
         evaluate(named, trajectories, cv=4, repeats=3)
         if number:  # the first one compiles
             samples.append(time.process_time() - start)
-    what = (
-        f"4-fold x 3 cross-validation of all {len(named)} predictors for kitchens, 5x9, "
-        f"{len(trajectories)} trajectories"
-    )
+    what = f"4-fold x 3 cross-validation, {len(named)} kitchen predictors, 5x9, {len(trajectories)} trajectories"
     return [Figure("evaluation", what, "s", tuple(samples))]
 
 
