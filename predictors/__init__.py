@@ -1,8 +1,8 @@
-"""Predictors of a person's next goal, and how well they read recorded or simulated people.
+"""Prediction of a person's next goal, and its evaluation on recorded and simulated participants.
 
 >>> from predictors import BayesianGoalPredictor
->>> predictor = BayesianGoalPredictor().fit(walks)                # doctest: +SKIP
->>> predictor.predict_proba_at(walks, fractions=(0.25, 0.5))      # doctest: +SKIP
+>>> predictor = BayesianGoalPredictor().fit(trajectories)         # doctest: +SKIP
+>>> predictor.predict_proba_at(trajectories, fractions=(0.25, 0.5))   # doctest: +SKIP
 """
 
 import lazy_loader as lazy

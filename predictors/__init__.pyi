@@ -9,6 +9,7 @@ from .reaching.baselines import ReachLogistic, ReachNeighbours
 from .reaching.bayesian import StraightLineBayesian
 from .reaching.gaussian import TimeSeriesGaussian
 from .registry import check_predictor, list_predictors, make_predictor, register_predictor
+from .uniform import UniformPredictor
 
 __all__ = [
     "BayesianGoalPredictor",
@@ -25,6 +26,7 @@ __all__ = [
     "ThresholdDecision",
     "TimeSeriesGaussian",
     "TransformerPredictor",
+    "UniformPredictor",
     "check_predictor",
     "list_predictors",
     "make_predictor",

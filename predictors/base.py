@@ -1,11 +1,12 @@
-"""What every predictor of goals can do, in the way of scikit-learn.
+"""What every goal predictor can do, in the manner of scikit-learn.
 
 A sample is a :class:`~legible_envs.rollouts.Trajectory` (a complete one, or a prefix of one); the columns of
 probabilities are ``classes_``, and each row is zero outside the trajectory's own candidates.
 
 To write a predictor, subclass :class:`GoalPredictor`, take parameters in ``__init__`` and store them unchanged, and
 define ``predict_proba``; define ``fit`` if something is learned (call ``super().fit(X)``, which learns ``classes_``).
-:func:`predictors.registry.check_predictor` tells what a predictor gets wrong.
+:func:`check_trajectories` and :meth:`GoalPredictor.candidate_columns` help with the input;
+:func:`predictors.registry.check_predictor` says what a predictor gets wrong.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, Final, Literal, Self
 
 import numpy as np
@@ -22,15 +24,24 @@ from sklearn.exceptions import NotFittedError
 
 from legible_envs.rollouts.trajectory import Cut, Trajectory
 
-__all__ = ["FRACTIONS", "TIE_TOLERANCE", "GoalPredictor", "GoalStream", "NoReader", "Ties", "correctness"]
+__all__ = [
+    "FRACTIONS",
+    "TIE_TOLERANCE",
+    "GoalPredictor",
+    "GoalStream",
+    "TieCredit",
+    "check_trajectories",
+    "correctness",
+]
 
-Ties = Literal["fractional", "strict"]
+TieCredit = Literal["fractional", "strict"]
+"""What a true goal counts that shares the top with others; see :func:`correctness`."""
 
 FRACTIONS: Final = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
-"""Fractions observed at which predictors are judged unless told otherwise."""
+"""Fractions observed at which predictors are evaluated by default."""
 
 TIE_TOLERANCE: Final = 1e-9
-"""Probabilities that differ by no more are a tie."""
+"""Probabilities that differ by at most this much are tied."""
 
 
 class GoalPredictor(BaseEstimator, ABC):
@@ -52,12 +63,12 @@ class GoalPredictor(BaseEstimator, ABC):
 
         Raises:
             ValueError: No trajectories.
-            TypeError: Something else than trajectories.
+            TypeError: Samples that are not trajectories.
         """
-        walks = self._check_trajectories(X)
-        if not walks:
+        trajectories = check_trajectories(X)
+        if not trajectories:
             raise ValueError(f"{type(self).__name__}.fit needs at least one trajectory, got none")
-        self.classes_ = np.array(sorted({name for walk in walks for name in walk.candidates}))
+        self.classes_ = np.array(sorted({name for trajectory in trajectories for name in trajectory.candidates}))
         return self
 
     @abstractmethod
@@ -71,7 +82,7 @@ class GoalPredictor(BaseEstimator, ABC):
             ``(n, K)``, rows summing to one, columns as in ``classes_``, zero for goals that are not candidates.
 
         Raises:
-            ValueError: A candidate that was never seen in ``fit``, or states the predictor cannot read.
+            ValueError: A candidate that ``fit`` did not see, or states that do not suit this predictor.
             NotFittedError: Before ``fit``.
         """
 
@@ -83,24 +94,24 @@ class GoalPredictor(BaseEstimator, ABC):
         Args:
             X: ``n`` complete trajectories.
             fractions: ``F`` fractions.
-            cut: Fraction of what; see :data:`legible_envs.rollouts.CUTS`.
+            cut: What the fraction is a share of, a key of :data:`legible_envs.rollouts.CUTS`.
 
         Returns:
             ``(n, F, K)``.
         """
-        walks = self._check_trajectories(X)
-        # Neighbouring fractions of short walks are the same prefix: ask once for each.
-        lengths = [[walk.prefix_length(fraction, cut) for fraction in fractions] for walk in walks]
+        trajectories = check_trajectories(X)
+        # Neighbouring fractions of short trajectories are the same prefix: predict once for each.
+        lengths = [[trajectory.prefix_length(fraction, cut) for fraction in fractions] for trajectory in trajectories]
         keys = sorted({(i, length) for i, row in enumerate(lengths) for length in row})
         row_of = {key: row for row, key in enumerate(keys)}
-        probabilities = self.predict_proba([walks[i].first(length) for i, length in keys])
+        probabilities = self.predict_proba([trajectories[i].first(length) for i, length in keys])
         rows = np.array([[row_of[i, length] for length in row] for i, row in enumerate(lengths)], dtype=np.intp)
-        return probabilities[rows.reshape(len(walks), len(fractions))]
+        return probabilities[rows.reshape(len(trajectories), len(fractions))]
 
     def predict(self, X: Sequence[Trajectory]) -> npt.NDArray[np.str_]:
-        """The most probable goal of each trajectory; among tied ones the first in ``classes_``.
+        """The most probable goal of each trajectory; among tied goals the first in ``classes_``.
 
-        Do not judge predictors by these labels: :meth:`score` shares ties out instead.
+        Do not evaluate predictors by these labels: :meth:`score` shares ties out instead.
         """
         probabilities = self.predict_proba(X)
         best = probabilities.max(axis=1, keepdims=True, initial=0.0)
@@ -113,33 +124,36 @@ class GoalPredictor(BaseEstimator, ABC):
         *,
         fractions: Sequence[float] = FRACTIONS,
         cut: Cut = "steps",
-        ties: Ties = "fractional",
+        ties: TieCredit = "fractional",
     ) -> float:
         """Mean accuracy over trajectories and fractions observed.
 
         Args:
-            X: Trajectories with known goals. Prefixes are judged as they are, complete ones at ``fractions``.
+            X: Trajectories with known goals: complete ones, scored at ``fractions``, or prefixes, scored as they are.
             y: Ignored; goals are part of the trajectories.
             fractions: Fractions observed.
-            cut: Fraction of what; see :data:`legible_envs.rollouts.CUTS`.
-            ties: ``"fractional"``: a goal among ``k`` tied ones counts 1/k. ``"strict"``: it counts nothing.
+            cut: What the fraction is a share of, a key of :data:`legible_envs.rollouts.CUTS`.
+            ties: ``"fractional"``: a true goal among ``k`` tied ones counts 1/k. ``"strict"``: it counts 0.
         """
-        walks = self._check_trajectories(X)
-        if not walks:
+        trajectories = check_trajectories(X)
+        if not trajectories:
             raise ValueError("no trajectories to score")
-        whole = [walk for walk in walks if walk.complete]
-        parts = [walk for walk in walks if not walk.complete]
-        if whole and parts:
-            raise ValueError(f"give complete trajectories or prefixes, not both ({len(whole)} and {len(parts)})")
-        if parts:
-            return float(correctness(self.predict_proba(parts), self.goal_columns(parts), ties).mean())
-        return float(correctness(self.predict_proba_at(whole, fractions, cut), self.goal_columns(whole), ties).mean())
+        complete = sum(trajectory.complete for trajectory in trajectories)
+        if 0 < complete < len(trajectories):
+            raise ValueError(
+                f"give complete trajectories or prefixes, not both ({complete} and {len(trajectories) - complete})"
+            )
+        if complete:
+            probabilities = self.predict_proba_at(trajectories, fractions, cut)
+        else:
+            probabilities = self.predict_proba(trajectories)
+        return float(correctness(probabilities, self.goal_columns(trajectories), ties).mean())
 
     def stream(self, context: Trajectory) -> GoalStream:
-        """Watch one person as they move.
+        """Predict one person's goal while they move.
 
         Args:
-            context: What is known beforehand: start, candidates, layout. Its states are not looked at.
+            context: What is known beforehand: start, candidates, layout. Its states are ignored.
 
         Returns:
             A stream; ``stream.update(point)`` returns ``{goal: probability}`` and equals :meth:`predict_proba` of the
@@ -147,42 +161,35 @@ class GoalPredictor(BaseEstimator, ABC):
         """
         return GoalStream(self, context)
 
-    def goal_columns(self, walks: Sequence[Trajectory]) -> npt.NDArray[np.intp]:
+    def goal_columns(self, trajectories: Sequence[Trajectory]) -> npt.NDArray[np.intp]:
         """``(n,)`` column of each trajectory's goal in ``classes_``.
 
         Raises:
-            ValueError: A trajectory without a known goal, or candidates that were never seen in ``fit``.
+            ValueError: A trajectory without a known goal, or candidates that ``fit`` did not see.
         """
         columns = []
-        for number, walk in enumerate(walks):
-            if walk.goal is None:
-                raise ValueError(f"trajectory {number} has no known goal to judge by")
-            columns.append(self._columns(walk)[walk.candidates.index(walk.goal)])
+        for number, trajectory in enumerate(trajectories):
+            if trajectory.goal is None:
+                raise ValueError(f"trajectory {number} has no known goal to compare with")
+            columns.append(self.candidate_columns(trajectory)[trajectory.candidates.index(trajectory.goal)])
         return np.array(columns, dtype=np.intp)
 
-    # -- for subclasses ---------------------------------------------------------------------------------------------
+    def candidate_columns(self, trajectory: Trajectory) -> npt.NDArray[np.intp]:
+        """``(len(trajectory.candidates),)`` columns of the candidates in ``classes_``, in the candidates' order.
 
-    @staticmethod
-    def _check_trajectories(X: Sequence[Trajectory]) -> list[Trajectory]:
-        if isinstance(X, Trajectory):
-            raise TypeError("expected a list of trajectories, got a single one; put it in a list")
-        walks = list(X)
-        for number, walk in enumerate(walks):
-            if not isinstance(walk, Trajectory):
-                raise TypeError(f"expected trajectories, got {type(walk).__name__} at index {number}")
-        return walks
-
-    def _columns(self, walk: Trajectory) -> npt.NDArray[np.intp]:
-        """Columns of a trajectory's candidates, in their order."""
+        Raises:
+            ValueError: A candidate that ``fit`` did not see.
+            NotFittedError: Before ``fit``.
+        """
         if not hasattr(self, "classes_"):
             raise NotFittedError(f"this {type(self).__name__} is not fitted yet; call `fit` with trajectories first")
-        # People meet the same few sets of candidates again and again: look each one up once per fit.
+        # The same few sets of candidates come again and again: look each one up once per fit.
         looked_up = self.__dict__.get("_looked_up")
         if looked_up is None or looked_up[0] is not self.classes_:
             looked_up = self._looked_up = (self.classes_, {})
-        found: npt.NDArray[np.intp] | None = looked_up[1].get(walk.candidates)
+        found: npt.NDArray[np.intp] | None = looked_up[1].get(trajectory.candidates)
         if found is None:
-            found = looked_up[1][walk.candidates] = self._look_up(walk.candidates)
+            found = looked_up[1][trajectory.candidates] = self._look_up(trajectory.candidates)
         return found
 
     def _look_up(self, candidates: tuple[str, ...]) -> npt.NDArray[np.intp]:
@@ -195,16 +202,31 @@ class GoalPredictor(BaseEstimator, ABC):
         return columns
 
 
+def check_trajectories(X: Sequence[Trajectory]) -> list[Trajectory]:
+    """The samples as a list.
+
+    Raises:
+        TypeError: A single trajectory, or samples that are not trajectories.
+    """
+    if isinstance(X, Trajectory):
+        raise TypeError("expected a list of trajectories, got a single one; put it in a list")
+    trajectories = list(X)
+    for number, trajectory in enumerate(trajectories):
+        if not isinstance(trajectory, Trajectory):
+            raise TypeError(f"expected trajectories, got {type(trajectory).__name__} at index {number}")
+    return trajectories
+
+
 def correctness(
-    probabilities: npt.NDArray[np.float64], goals: npt.NDArray[np.integer], ties: Ties = "fractional"
+    probabilities: npt.NDArray[np.float64], goals: npt.NDArray[np.integer], ties: TieCredit = "fractional"
 ) -> npt.NDArray[np.float64]:
     """How right predictions are, 0 to 1.
 
     Args:
         probabilities: ``(n, K)`` or ``(n, F, K)``.
         goals: ``(n,)`` column of each true goal.
-        ties: ``"fractional"``: the true goal among ``k`` at the top counts 1/k (the expected accuracy of picking one
-            of them at random). ``"strict"``: only the single top counts.
+        ties: ``"fractional"``: a true goal among ``k`` at the top counts 1/k, the expected accuracy of picking one of
+            them at random. ``"strict"``: only a true goal alone at the top counts.
 
     Returns:
         ``(n,)`` or ``(n, F)``.
@@ -219,18 +241,21 @@ def correctness(
 
 
 class GoalStream:
-    """A predictor's belief about one person, updated as they move; made by :meth:`GoalPredictor.stream`."""
+    """A predictor's belief about the goal of one person, updated while they move.
+
+    Made by :meth:`GoalPredictor.stream`.
+    """
 
     def __init__(self, predictor: GoalPredictor, context: Trajectory) -> None:
         self._predictor = predictor
         self._context = context.first(0)
-        self._columns = predictor._columns(context)
+        self._columns = predictor.candidate_columns(context)
         self._points: list[tuple[Any, ...]] = []
         self._times: list[float] = []
 
     @property
     def num_states(self) -> int:
-        """How many states have been seen; standing still on a cell of a grid is none."""
+        """How many states were observed; standing still on a cell of a grid adds none."""
         return len(self._points)
 
     @property
@@ -249,10 +274,11 @@ class GoalStream:
 
         Args:
             point: ``(d,)`` cell or position. Standing still on a cell of a grid adds nothing.
-            time: When, in seconds; one after the other without it.
+            time: When, in seconds; one second after the state before if None.
 
         Raises:
-            ValueError: Not a point, NaN, another dimension than before, or a time that runs backwards.
+            ValueError: A point that is not finite or has another dimension than those before, or a time that runs
+                backwards.
         """
         self.add(point, time)
         return self.belief
@@ -274,36 +300,7 @@ class GoalStream:
         self._times.append(when)
 
     def _observed(self) -> Trajectory:
+        """The prefix observed so far, with the context's labels but without its goal."""
         if not self._points:
             return self._context
-        part = self._context
-        return Trajectory(
-            states=np.array(self._points),
-            times=np.array(self._times),
-            start=part.start,
-            candidates=part.candidates,
-            participant=part.participant,
-            condition=part.condition,
-            layout=part.layout,
-            layout_name=part.layout_name,
-            candidate_set=part.candidate_set,
-            complete=False,
-            goal_positions=part.goal_positions,
-        )
-
-
-class NoReader:
-    """Believes in every valid goal alike, whatever it sees: a predictor in the sense of ``ReachWatcher``."""
-
-    def stream(self, context: Any) -> _Uniform:
-        """The belief about one reach; ``context.candidates`` are the goals."""
-        return _Uniform(context.candidates)
-
-
-class _Uniform:
-    def __init__(self, goals: Sequence[str]) -> None:
-        self.belief = {goal: 1 / len(goals) for goal in goals}
-
-    def update(self, point: Any, time: float | None = None) -> dict[str, float]:
-        """The same, whatever was seen."""
-        return dict(self.belief)
+        return replace(self._context, states=np.array(self._points), times=np.array(self._times), goal=None)

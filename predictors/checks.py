@@ -1,10 +1,11 @@
-"""What :func:`predictors.registry.check_predictor` looks at."""
+"""The checks that :func:`predictors.registry.check_predictor` makes."""
 
 from __future__ import annotations
 
 import pickle
 from collections.abc import Callable, Sequence
 from copy import deepcopy
+from dataclasses import replace
 
 import numpy as np
 from sklearn.base import clone
@@ -13,7 +14,7 @@ from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.rollouts.trajectory import Trajectory
 from predictors.base import GoalPredictor
 
-__all__ = ["example_walks", "find_problems"]
+__all__ = ["example_trajectories", "find_problems"]
 
 _KITCHEN = """
 XOXTX
@@ -24,11 +25,11 @@ XXSPX
 """
 
 
-def example_walks() -> list[Trajectory]:
-    """Eight walks in a small kitchen, some with fewer candidates than others."""
+def example_trajectories() -> list[Trajectory]:
+    """Eight trajectories in a small kitchen, some with fewer candidates than others."""
     layout = OvercookedLayout.from_ascii(_KITCHEN)
     three, two = ("onion", "tomato", "dish"), ("tomato", "onion")
-    walks = [
+    trajectories = [
         (((3, 2), (2, 2), (1, 2), (1, 1), (0, 1)), "onion", three),
         (((3, 2), (3, 1), (2, 1), (1, 1), (0, 1)), "onion", two),
         (((3, 2), (3, 3), (2, 3), (1, 3), (0, 3)), "tomato", three),
@@ -42,13 +43,13 @@ def example_walks() -> list[Trajectory]:
         Trajectory(
             np.array(cells), start="serving", goal=goal, candidates=candidates, participant=f"p{i % 4}", layout=layout
         )
-        for i, (cells, goal, candidates) in enumerate(walks)
+        for i, (cells, goal, candidates) in enumerate(trajectories)
     ]
 
 
 def find_problems(predictor: GoalPredictor, X: Sequence[Trajectory] | None = None) -> list[str]:
     """Everything that a predictor gets wrong, in words; empty if nothing."""
-    walks = example_walks() if X is None else list(X)
+    trajectories = example_trajectories() if X is None else list(X)
     problems: list[str] = []
 
     def attempt(what: str, check: Callable[[], str | None]) -> None:
@@ -61,14 +62,17 @@ def find_problems(predictor: GoalPredictor, X: Sequence[Trajectory] | None = Non
 
     attempt("parameters", lambda: _check_parameters(predictor))
     fitted: list[GoalPredictor] = []
-    attempt("fit", lambda: _check_fit(predictor, walks, fitted))
+    attempt("fit", lambda: _check_fit(predictor, trajectories, fitted))
     if fitted:
-        attempt("predict_proba", lambda: _check_probabilities(fitted[0], walks))
-        attempt("empty prefix", lambda: _check_probabilities(fitted[0], [walk.first(0) for walk in walks]))
-        attempt("independence of samples", lambda: _check_independence(fitted[0], walks))
-        attempt("ignorance of the goal", lambda: _check_ignorance(fitted[0], walks))
-        attempt("stream", lambda: _check_stream(fitted[0], walks[0]))
-        attempt("pickling", lambda: _check_pickle(fitted[0], walks))
+        attempt("predict_proba", lambda: _check_probabilities(fitted[0], trajectories))
+        attempt(
+            "empty prefix",
+            lambda: _check_probabilities(fitted[0], [trajectory.first(0) for trajectory in trajectories]),
+        )
+        attempt("independence of samples", lambda: _check_independence(fitted[0], trajectories))
+        attempt("ignorance of the goal", lambda: _check_ignorance(fitted[0], trajectories))
+        attempt("stream", lambda: _check_stream(fitted[0], trajectories[0]))
+        attempt("pickling", lambda: _check_pickle(fitted[0], trajectories))
     return problems
 
 
@@ -80,79 +84,62 @@ def _check_parameters(predictor: GoalPredictor) -> str | None:
     return f"`__init__` must not set learned attributes, found {learned}" if learned else None
 
 
-def _check_fit(predictor: GoalPredictor, walks: Sequence[Trajectory], fitted: list[GoalPredictor]) -> str | None:
+def _check_fit(predictor: GoalPredictor, trajectories: Sequence[Trajectory], fitted: list[GoalPredictor]) -> str | None:
     copy = deepcopy(predictor)
-    result = copy.fit(walks)
+    result = copy.fit(trajectories)
     if result is not copy:
         return f"must return self, returned {type(result).__name__}"
-    names = sorted({name for walk in walks for name in walk.candidates})
+    names = sorted({name for trajectory in trajectories for name in trajectory.candidates})
     if not hasattr(copy, "classes_") or list(copy.classes_) != names:
         return f"`classes_` must hold the sorted names {names}; call super().fit(X)"
     fitted.append(copy)
     return None
 
 
-def _check_probabilities(predictor: GoalPredictor, walks: Sequence[Trajectory]) -> str | None:
-    rows = predictor.predict_proba(walks)
-    expected = (len(walks), len(predictor.classes_))
+def _check_probabilities(predictor: GoalPredictor, trajectories: Sequence[Trajectory]) -> str | None:
+    rows = predictor.predict_proba(trajectories)
+    expected = (len(trajectories), len(predictor.classes_))
     if not isinstance(rows, np.ndarray) or rows.shape != expected:
         return f"expected an array of shape {expected}, got {getattr(rows, 'shape', type(rows).__name__)}"
     if not np.isfinite(rows).all() or (rows < 0).any():
         return "probabilities must be finite and >= 0"
     if not np.allclose(rows.sum(axis=1), 1.0):
         return f"rows must sum to 1, got {rows.sum(axis=1).round(6).tolist()}"
-    for row, walk in zip(rows, walks, strict=True):
+    for row, trajectory in zip(rows, trajectories, strict=True):
         others = [
-            name for name, p in zip(predictor.classes_, row, strict=True) if p > 0 and name not in walk.candidates
+            name for name, p in zip(predictor.classes_, row, strict=True) if p > 0 and name not in trajectory.candidates
         ]
         if others:
-            return f"{others} got probability without being candidates {walk.candidates}"
+            return f"{others} got probability without being candidates {trajectory.candidates}"
     return None
 
 
-def _check_independence(predictor: GoalPredictor, walks: Sequence[Trajectory]) -> str | None:
-    together = predictor.predict_proba(walks)
-    alone = np.concatenate([predictor.predict_proba([walk]) for walk in reversed(walks)])[::-1]
+def _check_independence(predictor: GoalPredictor, trajectories: Sequence[Trajectory]) -> str | None:
+    together = predictor.predict_proba(trajectories)
+    alone = np.concatenate([predictor.predict_proba([trajectory]) for trajectory in reversed(trajectories)])[::-1]
     return None if np.allclose(together, alone, atol=1e-6) else "the answer depends on the other samples or their order"
 
 
-def _check_ignorance(predictor: GoalPredictor, walks: Sequence[Trajectory]) -> str | None:
+def _check_ignorance(predictor: GoalPredictor, trajectories: Sequence[Trajectory]) -> str | None:
     """A predictor that peeks at the true goal is perfect and worthless."""
-    prefixes = [walk.first(1) for walk in walks]
-    blind = [_with_goal(walk, None) for walk in prefixes]
+    prefixes = [trajectory.first(1) for trajectory in trajectories]
+    blind = [replace(trajectory, goal=None) for trajectory in prefixes]
     same = np.allclose(predictor.predict_proba(prefixes), predictor.predict_proba(blind), atol=1e-9)
     return None if same else "the answer depends on the trajectory's goal, which is what it should predict"
 
 
-def _with_goal(walk: Trajectory, goal: str | None) -> Trajectory:
-    return Trajectory(
-        states=walk.states,
-        times=walk.times,
-        start=walk.start,
-        goal=goal,
-        candidates=walk.candidates,
-        participant=walk.participant,
-        condition=walk.condition,
-        layout=walk.layout,
-        layout_name=walk.layout_name,
-        candidate_set=walk.candidate_set,
-        complete=walk.complete,
-        goal_positions=walk.goal_positions,
-    )
-
-
-def _check_stream(predictor: GoalPredictor, walk: Trajectory) -> str | None:
-    stream = predictor.stream(walk)
-    for count, (state, time) in enumerate(zip(walk.states, walk.times, strict=True), 1):
+def _check_stream(predictor: GoalPredictor, trajectory: Trajectory) -> str | None:
+    stream = predictor.stream(trajectory)
+    for count, (state, time) in enumerate(zip(trajectory.states, trajectory.times, strict=True), 1):
         belief = stream.update(state, float(time))
-        row = predictor.predict_proba([walk.first(count)])[0]
-        expected = {name: row[list(predictor.classes_).index(name)] for name in walk.candidates}
+        row = predictor.predict_proba([trajectory.first(count)])[0]
+        expected = {name: row[list(predictor.classes_).index(name)] for name in trajectory.candidates}
         if belief.keys() != expected.keys() or any(abs(belief[name] - expected[name]) > 1e-9 for name in expected):
             return f"after {count} states the belief is {belief}, predict_proba of the same prefix {expected}"
     return None
 
 
-def _check_pickle(predictor: GoalPredictor, walks: Sequence[Trajectory]) -> str | None:
+def _check_pickle(predictor: GoalPredictor, trajectories: Sequence[Trajectory]) -> str | None:
     copy = pickle.loads(pickle.dumps(predictor))
-    same = np.array_equal(copy.predict_proba(walks), predictor.predict_proba(walks))
+    same = np.array_equal(copy.predict_proba(trajectories), predictor.predict_proba(trajectories))
     return None if same else "a pickled copy answers differently"

@@ -2,6 +2,10 @@
 
 A predictor is a subclass of :class:`~predictors.base.GoalPredictor`, known by ``register_predictor("mine", Mine)``, by
 an entry point in group ``legible.predictors``, or, without either, as ``"module:Class"``.
+
+The built-in predictors are entry points of this project too (``pyproject.toml``): so the environment of the table,
+which must not import this package, finds them by the same names. :data:`BUILT_IN` is their source and holds in every
+installation, however old its metadata; an entry point of the same name is the same predictor and is listed once.
 """
 
 from __future__ import annotations
@@ -14,6 +18,7 @@ from legible_envs.support.plugins import Plugin, Registry
 from predictors.base import GoalPredictor
 
 __all__ = [
+    "BUILT_IN",
     "ENTRY_POINT_GROUP",
     "PredictorError",
     "PredictorInfo",
@@ -30,28 +35,26 @@ PredictorInfo = Plugin
 
 
 class PredictorError(ValueError):
-    """A predictor cannot be found, made, or breaks the contract."""
+    """A predictor cannot be found or made, or breaks the contract."""
 
 
-_registry = Registry(
-    "predictor",
-    ENTRY_POINT_GROUP,
-    {
-        "bayesian": "predictors.grid.bayesian:BayesianGoalPredictor",
-        "grid-knn": "predictors.grid.baselines:GridNeighbours",
-        "grid-logistic": "predictors.grid.baselines:GridLogistic",
-        "grid-ngram": "predictors.grid.baselines:GridNGram",
-        "maxent-irl": "predictors.grid.maxent_irl:MaxEntIRL",
-        "reach-bayesian": "predictors.reaching.bayesian:StraightLineBayesian",
-        "reach-gaussian": "predictors.reaching.gaussian:TimeSeriesGaussian",
-        "reach-knn": "predictors.reaching.baselines:ReachNeighbours",
-        "reach-logistic": "predictors.reaching.baselines:ReachLogistic",
-        "recurrent": "predictors.neural.models:RecurrentPredictor",
-        "shortest-distance": "predictors.grid.shortest_distance:ShortestDistance",
-        "transformer": "predictors.neural.models:TransformerPredictor",
-    },
-    PredictorError,
-)
+BUILT_IN: Final = {
+    "bayesian": "predictors.grid.bayesian:BayesianGoalPredictor",
+    "grid-knn": "predictors.grid.baselines:GridNeighbours",
+    "grid-logistic": "predictors.grid.baselines:GridLogistic",
+    "grid-ngram": "predictors.grid.baselines:GridNGram",
+    "maxent-irl": "predictors.grid.maxent_irl:MaxEntIRL",
+    "reach-bayesian": "predictors.reaching.bayesian:StraightLineBayesian",
+    "reach-gaussian": "predictors.reaching.gaussian:TimeSeriesGaussian",
+    "reach-knn": "predictors.reaching.baselines:ReachNeighbours",
+    "reach-logistic": "predictors.reaching.baselines:ReachLogistic",
+    "recurrent": "predictors.neural.models:RecurrentPredictor",
+    "shortest-distance": "predictors.grid.shortest_distance:ShortestDistance",
+    "transformer": "predictors.neural.models:TransformerPredictor",
+}
+"""Name and ``module:Class`` of every predictor that comes with this package."""
+
+_registry = Registry("predictor", ENTRY_POINT_GROUP, BUILT_IN, PredictorError)
 
 
 def register_predictor(name: str, factory: Callable[..., GoalPredictor], *, overwrite: bool = False) -> None:
@@ -99,7 +102,7 @@ def check_predictor(spec: PredictorSpec, X: Sequence[Trajectory] | None = None, 
 
     Args:
         spec: The predictor, in any form :func:`make_predictor` takes.
-        X: Trajectories to try it on; a few walks in a small kitchen if None.
+        X: Trajectories to try it on; a few in a small kitchen if None.
         parameters: Its parameters.
 
     Raises:

@@ -224,12 +224,12 @@ def score(
     if not predictors:
         read_people(say(), design, trajectories)
         return
-    from benchmarks.reports.prediction_report import print_reading, read_walks, save_reading
+    from benchmarks.reports.prediction_report import evaluate_trajectories, print_evaluation, save_evaluation
 
     walks = walks_in(design, trajectories)
-    reading = read_walks(walks, predictors, groups="participant" if by_participant else None, **settings)
-    print_reading(say(), reading)
-    for line in save_reading(reading, layout, out):
+    results = evaluate_trajectories(walks, predictors, groups="participant" if by_participant else None, **settings)
+    print_evaluation(say(), results)
+    for line in save_evaluation(results, layout, out):
         click.echo(line)
 
 

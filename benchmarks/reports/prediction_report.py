@@ -1,4 +1,4 @@
-"""How well predictors read the people in a file: tables, figures and the section of a report."""
+"""Evaluation of goal predictors on the trajectories of a file: tables, figures and the section of a report."""
 
 from __future__ import annotations
 
@@ -20,7 +20,15 @@ if TYPE_CHECKING:
     from predictors.evaluation.cross_validation import Comparison, Evaluation, LearningCurve
     from predictors.evaluation.splits import Groups
 
-__all__ = ["FOLDER", "Reading", "print_reading", "read_walks", "reading_section", "save_reading", "write_reading"]
+__all__ = [
+    "FOLDER",
+    "PredictionResults",
+    "evaluate_trajectories",
+    "evaluation_section",
+    "print_evaluation",
+    "save_evaluation",
+    "write_evaluation",
+]
 
 FOLDER: Final = "people"
 """Where in a run's folder ``legible score RUN --predictor`` writes."""
@@ -30,14 +38,14 @@ _CONFUSION_AT: Final = 0.5
 
 
 @dataclass(frozen=True, eq=False)
-class Reading:
-    """What was found.
+class PredictionResults:
+    """What :func:`evaluate_trajectories` found.
 
     Attributes:
         evaluation: By cross-validation.
-        curve: The learning curve, or None where it was not asked for or cannot be drawn.
+        curve: The learning curve, or None where it was not wanted or there are too few trajectories for one.
         comparisons: By what was compared: ``"predictor"``, or ``"condition"`` and whose values.
-        notes: What was left out, and why.
+        notes: Analyses that were left out, and why.
     """
 
     evaluation: Evaluation
@@ -46,8 +54,8 @@ class Reading:
     notes: list[str] = field(default_factory=list)
 
 
-def read_walks(
-    walks: Sequence[Trajectory],
+def evaluate_trajectories(
+    trajectories: Sequence[Trajectory],
     predictors: Sequence[str],
     *,
     cut: Cut = "steps",
@@ -57,30 +65,30 @@ def read_walks(
     keep_rare: bool = False,
     curve: bool = True,
     seed: int = 0,
-) -> Reading:
-    """Judge predictors on walks, compare them, and compare the conditions among the walks.
+) -> PredictionResults:
+    """Evaluate predictors on trajectories, compare them, and compare the conditions among the trajectories.
 
     Args:
-        walks: Complete, with goals.
+        trajectories: Complete, with goals.
         predictors: Names or ``"module:Class"``.
-        cut: Fraction of what; see :data:`legible_envs.rollouts.CUTS`.
+        cut: What the fraction is a share of, a key of :data:`legible_envs.rollouts.CUTS`.
         folds: Of the cross-validation.
         repeats: Of the cross-validation.
-        groups: ``"participant"`` keeps each person on one side of every split.
-        keep_rare: Whether to judge goals with fewer examples than folds.
-        curve: Whether to draw a learning curve, which learns fifteen times more.
+        groups: ``"participant"`` keeps each participant on one side of every split.
+        keep_rare: Whether to keep goals with fewer examples than folds.
+        curve: Whether to make a learning curve, which fits each predictor fifteen times more.
         seed: Of the splits.
 
     Raises:
         PredictorError: A predictor that cannot be found or made.
-        ValueError: Walks that cannot be split so.
+        ValueError: Trajectories that cannot be split so.
     """
     from predictors.evaluation.cross_validation import evaluate, learning_curve
 
     names = list(dict.fromkeys(predictors))
     found = evaluate(
         names,
-        walks,
+        trajectories,
         cv=folds,
         repeats=repeats,
         cut=cut,
@@ -92,16 +100,16 @@ def read_walks(
     grown = None
     if curve:
         try:
-            grown = learning_curve(names, walks, cut=cut, groups=groups, repeats=3, seed=seed)
+            grown = learning_curve(names, trajectories, cut=cut, groups=groups, repeats=3, seed=seed)
         except ValueError as error:
             notes.append(f"no learning curve: {error}")
     comparisons: dict[str, tuple[Comparison, Comparison]] = {}
     if len(names) > 1:
         _compare(comparisons, notes, "predictor", found, factor="predictor")
-    if len({walk.condition for walk in walks}) > 1:
+    if len({trajectory.condition for trajectory in trajectories}) > 1:
         for name in names:
             _compare(comparisons, notes, f"condition ({name})", found, factor="condition", predictor=name)
-    return Reading(found, grown, comparisons, notes)
+    return PredictionResults(found, grown, comparisons, notes)
 
 
 def _compare(
@@ -123,21 +131,21 @@ def _compare(
 # -- the terminal -----------------------------------------------------------------------------------------------------
 
 
-def print_reading(console: Console, reading: Reading) -> None:
+def print_evaluation(console: Console, results: PredictionResults) -> None:
     """Print the figures of merit, accuracy against fraction observed, comparisons, and what they mean."""
     from benchmarks.console import table
 
-    found = reading.evaluation
+    found = results.evaluation
     number = found.table["trajectory"].nunique()
-    console.print(f"\n{number:,} walks: how well predictors read them, mean over fractions observed", style="bold")
+    console.print(f"\n{number:,} trajectories: prediction of their goals, mean over fractions observed", style="bold")
     console.print(table(_summary_rows(found)))
-    console.print("Accuracy by share of the walk observed", style="bold")
+    console.print("Accuracy by fraction observed", style="bold")
     console.print(table(_accuracy_rows(found)))
-    for what, (_, mean) in reading.comparisons.items():
+    for what, (_, mean) in results.comparisons.items():
         console.print(f"Differences by {what}", style="bold")
         console.print(table(_pair_rows(mean)))
         console.print(_verdict(mean), style="dim")
-    for note in reading.notes:
+    for note in results.notes:
         console.print(note, style="yellow", markup=False)
     console.print(f"definition: {found.definition}", style="dim", markup=False)
 
@@ -166,7 +174,7 @@ def _records(table: pd.DataFrame) -> list[dict[str, Any]]:
 
 
 def _verdict(comparison: Comparison) -> str:
-    """The analysis of variance in the words of a paper."""
+    """The analysis of variance as a paper reports it."""
     row = comparison.anova.iloc[0]
     kind = "repeated-measures" if comparison.design == "within" else "one-way"
     p = float(row["p_corrected"] if comparison.design == "within" else row["p"])
@@ -182,7 +190,7 @@ def _verdict(comparison: Comparison) -> str:
 # -- files ------------------------------------------------------------------------------------------------------------
 
 
-def write_reading(reading: Reading, folder: Path, *, title: str = "How well people can be read") -> list[Path]:
+def write_evaluation(results: PredictionResults, folder: Path, *, title: str = "Goal prediction") -> list[Path]:
     """Write tidy tables (CSV), figures (SVG), ``reading.json`` and a page ``report.html`` into a folder.
 
     Returns:
@@ -192,22 +200,22 @@ def write_reading(reading: Reading, folder: Path, *, title: str = "How well peop
         OSError: The folder cannot be made or written to.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    written = [_write(folder / f"{name}.csv", table.to_csv(index=False)) for name, table in _tables(reading).items()]
-    for name in _FIGURES:  # those of an earlier reading must not stand beside this one's tables
+    written = [_write(folder / f"{name}.csv", table.to_csv(index=False)) for name, table in _tables(results).items()]
+    for name in _FIGURES:  # those of an earlier evaluation must not stand beside this one's tables
         (folder / f"{name}.svg").unlink(missing_ok=True)
-    written += [_write(folder / f"{name}.svg", svg) for name, svg in _drawn(reading).items()]
-    written.append(_write(folder / _FILE, json.dumps(_about(reading), indent=1)))
+    written += [_write(folder / f"{name}.svg", svg) for name, svg in _drawn(results).items()]
+    written.append(_write(folder / _FILE, json.dumps(_about(results), indent=1)))
     written.append(_write(folder / "report.html", _page(folder, title)))
     return written
 
 
-def save_reading(reading: Reading, layout: str, out: Path | None) -> list[str]:
-    """Write a reading where it belongs, and say where: into ``out``, or into the folder and report of a run.
+def save_evaluation(results: PredictionResults, layout: str, out: Path | None) -> list[str]:
+    """Write results into ``out``, or into the folder and report of a run, and say where.
 
     Args:
-        reading: What was found.
-        layout: What the command line calls the kitchen: a run's folder, or something else.
-        out: The folder asked for; None takes the run's, and writes nothing without a run.
+        results: What :func:`evaluate_trajectories` found.
+        layout: The layout as the command line names it; may be a run's folder.
+        out: The folder to write into; None takes the run's, and writes nothing without a run.
     """
     from benchmarks.reports.search_report import write_report
     from benchmarks.runs import is_run_folder
@@ -216,7 +224,7 @@ def save_reading(reading: Reading, layout: str, out: Path | None) -> list[str]:
     if out is None and not is_run:
         return []
     folder = out or Path(layout) / FOLDER
-    write_reading(reading, folder)
+    write_evaluation(results, folder)
     lines = [f"tables, figures, page: {folder}"]
     if out is None:
         lines.append(f"report: {write_report(layout)}")
@@ -228,21 +236,21 @@ def _write(path: Path, text: str) -> Path:
     return path
 
 
-def _tables(reading: Reading) -> dict[str, pd.DataFrame]:
+def _tables(results: PredictionResults) -> dict[str, pd.DataFrame]:
     import pandas as pd
 
-    found = reading.evaluation
+    found = results.evaluation
     tables = {
         "predictions": found.table,
         "accuracy": found.accuracy(),
         "metrics": found.metrics(),
         "confusion": found.confusion,
     }
-    if reading.curve is not None:
-        tables["learning_curve"] = reading.curve.table
+    if results.curve is not None:
+        tables["learning_curve"] = results.curve.table
     for part in ("anova", "means", "pairs"):
         found_parts = []
-        for what, (each, mean) in reading.comparisons.items():
+        for what, (each, mean) in results.comparisons.items():
             for at, comparison in (("each", each), ("mean", mean)):
                 table = getattr(comparison, part).rename(columns={comparison.factor: "level"})
                 found_parts.append(table.assign(compared=what, at=at, unit=comparison.unit, design=comparison.design))
@@ -251,25 +259,25 @@ def _tables(reading: Reading) -> dict[str, pd.DataFrame]:
     return tables
 
 
-def _drawn(reading: Reading) -> dict[str, str]:
+def _drawn(results: PredictionResults) -> dict[str, str]:
     from predictors.evaluation.figures import accuracy_figure, confusion_figure, learning_curve_figure
 
-    found = reading.evaluation
+    found = results.evaluation
     best = str(found.summary().set_index("predictor")["accuracy"].idxmax())
     at = min(found.fractions, key=lambda fraction: abs(fraction - _CONFUSION_AT))
     matrix = found.confusion_matrix(best, fraction=at)
     figures = {
         "accuracy": accuracy_figure(found),
-        "confusion": confusion_figure(matrix, title=f"What {best} takes for what, {100 * at:.0f} % observed"),
+        "confusion": confusion_figure(matrix, title=f"Goals and predictions of {best}, {100 * at:.0f} % observed"),
     }
-    if reading.curve is not None:
-        figures["learning_curve"] = learning_curve_figure(reading.curve)
+    if results.curve is not None:
+        figures["learning_curve"] = learning_curve_figure(results.curve)
     return figures
 
 
-def _about(reading: Reading) -> dict[str, Any]:
-    """What the section of a report says, as JSON."""
-    found = reading.evaluation
+def _about(results: PredictionResults) -> dict[str, Any]:
+    """The content of the section of a report, as JSON."""
+    found = results.evaluation
     return {
         "schema": 1,
         "definition": found.definition,
@@ -278,14 +286,14 @@ def _about(reading: Reading) -> dict[str, Any]:
         "summary": _summary_rows(found),
         "comparisons": [
             {"what": what, "verdict": _verdict(mean), "pairs": _finite(_pair_rows(mean))}
-            for what, (_, mean) in reading.comparisons.items()
+            for what, (_, mean) in results.comparisons.items()
         ],
-        "notes": reading.notes,
+        "notes": results.notes,
     }
 
 
 def _finite(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Infinite effect sizes have no place in JSON."""
+    """Rows for JSON, which has no infinite effect sizes: None instead."""
     return [
         {key: None if isinstance(value, float) and abs(value) == float("inf") else value for key, value in row.items()}
         for row in rows
@@ -295,10 +303,10 @@ def _finite(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
 # -- HTML -------------------------------------------------------------------------------------------------------------
 
 
-def reading_section(folder: Path) -> str | None:
-    """The section of a report about a reading that :func:`write_reading` left in a folder, or None if there is none.
+def evaluation_section(folder: Path) -> str | None:
+    """The section of a report about what :func:`write_evaluation` wrote into a folder, or None if there is none.
 
-    Figures become images within the page: whatever their files hold, nothing of it can run.
+    Figures become images within the page, so that no script in their files can run.
     """
     try:
         about = json.loads((folder / _FILE).read_text(encoding="utf-8"))
@@ -318,7 +326,7 @@ def _page(folder: Path, title: str) -> str:
     from markupsafe import Markup
 
     style = (files("benchmarks") / "templates" / "report.css").read_text(encoding="utf-8")
-    section = reading_section(folder) or ""
+    section = evaluation_section(folder) or ""
     template = _environment().get_template("people_page.html.j2")
     return template.render(title=title, style=Markup(style), section=Markup(section))
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.presenters.base import Condition, Presenter, loss_row, presenter_of
-from benchmarks.reports.prediction_report import FOLDER, reading_section
+from benchmarks.reports.prediction_report import FOLDER, evaluation_section
 from benchmarks.runs import Run, read_run
 from legible_envs.support.files import write_atomically
 
@@ -62,7 +62,7 @@ def write_report(
     path = run.folder / "report.html"
     presenter = _presenter(run)
     data = report_data(run, conditions, recorded_play)
-    page = _render(data, presenter, _reaches(run), reading_section(run.folder / FOLDER) or "")
+    page = _render(data, presenter, _reaches(run), evaluation_section(run.folder / FOLDER) or "")
     write_atomically(path, lambda stream: stream.write(page.encode()))
     return path
 

@@ -1,4 +1,4 @@
-"""Measuring: samples that take turns, so that a machine's moods hit all of them alike."""
+"""Measuring: samples that take turns, so that run-to-run variance affects all of them alike."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Figure:
 
     Attributes:
         key: Its name in :data:`benchmarks.throughput.sweep.TARGETS`, or any other.
-        what: What it is, for people.
+        what: Its description in tables.
         unit: ``"/s"``, ``"s"``, ``"x"`` (a ratio) or ``"share"``.
         samples: All measured values; the median is reported.
     """
@@ -50,7 +50,7 @@ def rate(work: Callable[[], int], seconds: float) -> float:
 
 
 def alternate(samplers: Mapping[str, Callable[[], float]], rounds: int) -> dict[str, tuple[float, ...]]:
-    """Take one sample of each in turn, ``rounds`` times, after one unrecorded round that warms up."""
+    """Take one sample of each in turn, ``rounds`` times, after one unrecorded warm-up round."""
     samples: dict[str, list[float]] = {name: [] for name in samplers}
     for number in range(rounds + 1):
         for name, sampler in samplers.items():

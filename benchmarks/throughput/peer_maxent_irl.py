@@ -1,13 +1,13 @@
 """Runs in the environment of imitation or irl-maxent, on the problem in the file named second.
 
 To "rate SECONDS" it answers with gradients per second, to "gradient" with the gradient itself. The problem, made by
-:func:`.save_problem`: ``next`` ``(n, 4)`` cells beside each cell (-1: none), ``goals``
-``(n, 4, K)`` whether that move enters a station, ``starts`` ``(K, n)`` how many walks to each station begin where,
-``visits`` ``(n,)`` how often cells were entered or begun in, ``rewards`` ``(n,)`` of the cells, ``horizon`` after how
-many steps walks end at the latest (imitation needs such a limit). Both packages know one task at a time: there is one
-for each station, with two states more. The station's is left for no other, and its reward of ``-log 4`` makes its four
-ways of staying weigh 1 together. Impossible moves lead to the last state, which is too expensive for anyone. Stated so,
-both compute the gradient that this project computes, which asks them for it to compare.
+:func:`.save_problem`: ``next`` ``(n, 4)`` cells beside each cell (-1: none), ``goals`` ``(n, 4, K)`` whether that move
+enters a station, ``starts`` ``(K, n)`` number of trajectories to each station that begin in each cell, ``visits``
+``(n,)`` how often each cell was entered or begun in, ``rewards`` ``(n,)`` of the cells, ``horizon`` the most steps of a
+trajectory (imitation needs such a limit). Both packages know one task at a time: there is one for each station, with
+two states more. The station's state absorbs, and its reward of ``-log 4`` makes its four actions weigh 1 together.
+Impossible moves lead to the last state, whose cost is prohibitive. Stated so, both compute the gradient of this
+project, which is compared with theirs.
 """
 
 import json
@@ -22,7 +22,7 @@ DEAD = -300.0
 
 
 def tasks(problem: Any) -> Iterator[tuple[Any, Any, Any]]:
-    """For each station: ``(S, 4, S)`` transitions, ``(S,)`` number of walks that begin there, ``(S,)`` rewards."""
+    """For each station: ``(S, 4, S)`` transitions, ``(S,)`` number of starts in each state, ``(S,)`` rewards."""
     count = len(problem["next"])
     for goal, starts in enumerate(problem["starts"]):
         moves = np.zeros((count + 2, 4, count + 2))

@@ -1,4 +1,4 @@
-"""Other people's packages, measured beside this project: each in a virtual environment and a process of its own."""
+"""Packages of other authors, measured beside this project: each in its own virtual environment and process."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Package:
 OVERCOOKED_AI: Final = Package(
     "overcooked-ai", "peer_overcooked_ai.py", (("overcooked-ai==1.1.0", "scipy", "numpy<2", "setuptools<81"),)
 )
-"""Its last two requirements are those it does not mention."""
+"""Its own metadata lacks the last two requirements."""
 
 # A torch that is there already keeps pip from pulling in a build with CUDA.
 IMITATION: Final = Package(
@@ -69,7 +69,7 @@ class Peer:
     """
 
     def __init__(self, python: Path, package: Package, arguments: Sequence[str] = ()) -> None:
-        # What it has to say goes to a file: a pipe that nobody reads would stop it once full.
+        # Its errors go to a file: a full pipe that is never read would stop it.
         self._complaints = tempfile.TemporaryFile(mode="w+")  # noqa: SIM115  (closed in `close`)
         with as_file(files("benchmarks.throughput") / package.script) as script:
             self._process = subprocess.Popen(
@@ -95,7 +95,7 @@ class Peer:
 
         Args:
             seconds: How long to measure.
-            observe: Whether each step also makes the grid of numbers that agents learn from.
+            observe: Whether each step also computes the grid observation that agents learn from.
 
         Raises:
             PeerError: It stopped.
@@ -105,7 +105,7 @@ class Peer:
     def ask(self, request: str, answer: str) -> str:
         """What follows the word ``answer`` in its reply."""
         assert self._process.stdin is not None
-        with contextlib.suppress(BrokenPipeError):  # it has stopped: its last words are said below
+        with contextlib.suppress(BrokenPipeError):  # it has stopped: the error below quotes its last line
             self._process.stdin.write(f"{request}\n")
             self._process.stdin.flush()
         return self._answer(answer).removeprefix(answer).strip()
@@ -176,7 +176,7 @@ def opened(
         packages: The peers, and the arguments of their programs.
         folder: See :func:`open_peer`.
         remarks: Where remarks are added.
-        console: Where it is shown that something is being installed.
+        console: Shows the progress of installations.
     """
     peers: dict[str, Peer] = {}
     with contextlib.ExitStack() as stack:

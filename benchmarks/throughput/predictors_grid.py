@@ -1,4 +1,4 @@
-"""How fast people are read: maximum-entropy IRL beside other packages', updates of beliefs, whole evaluations."""
+"""Speed of prediction in kitchens: maximum-entropy IRL beside other packages, updates of beliefs, whole evaluations."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     from predictors.base import GoalPredictor
     from predictors.grid.walk_likelihood import Evidence
 
-__all__ = ["PEER_PROBLEM", "evaluating", "noisy_walks", "reading", "save_problem"]
+__all__ = ["PEER_PROBLEM", "evaluation_speed", "noisy_trajectories", "prediction_speed", "save_problem"]
 
 PEER_PROBLEM: Final = "problem.npz"
 _COST: Final = 1.8
-"""Per step, where gradients are taken: about what the walks say."""
+"""Per step, where gradients are taken: about the best uniform cost of the trajectories."""
 _HORIZON: Final = 60
-"""Steps after which walks end for imitation, which needs a limit: at 40 its gradient is wrong in the third digit."""
+"""Length limit that imitation needs: at 40 steps its gradient is wrong in the third digit."""
 _PEERS: Final = {
     "imitation": f"the same gradient by imitation (tabular, a task per goal, {_HORIZON} steps)",
     "irl-maxent": "the same gradient by irl-maxent (a task per goal)",
@@ -36,29 +36,29 @@ _PEERS: Final = {
 _KITCHEN = "\n".join(["XOXXTXXDX", *["X       X"] * 7, "XXPXXXCXX"])
 _RING = "\n".join(["XOXXTXXDX", "X       X", "X XXXXX X", "X       X", "XXPXXXCXX"])
 _UPDATES = {
-    "update Eq. 1": ("bayesian", "a belief by Eq. 1 updated with a step"),
-    "update MaxEnt": ("maxent-irl", "a belief by maximum-entropy IRL updated with a step"),
-    "update n-gram": ("grid-ngram", "a belief by the n-gram updated with a step"),
-    "update k-NN": ("grid-knn", "a belief by nearest neighbours updated with a step"),
-    "update logistic": ("grid-logistic", "a belief by logistic regression updated with a step"),
+    "update Eq. 1": ("bayesian", "one update of Bayesian goal inference (Eq. 1)"),
+    "update MaxEnt": ("maxent-irl", "one update of maximum-entropy IRL"),
+    "update n-gram": ("grid-ngram", "one update of the n-gram"),
+    "update k-NN": ("grid-knn", "one update of nearest neighbours"),
+    "update logistic": ("grid-logistic", "one update of logistic regression"),
 }
 
 
-def reading(
+def prediction_speed(
     settings: Settings, peers: Mapping[str, Peer] | None = None, remarks: list[str] | None = None
 ) -> list[Figure]:
-    """Seconds per gradient, per fit and per update of a belief, on 200 walks to 5 goals in a kitchen of 9 x 9.
+    """Seconds per gradient, per fit and per update, on 200 trajectories to 5 goals in a kitchen of 9 x 9.
 
     Args:
         settings: Sizes and repeats.
         peers: Other packages by name, started on the file of :func:`save_problem`.
-        remarks: Where it is said which of them compute something else.
+        remarks: Gets a line for each of them that computes another gradient.
     """
     from predictors.grid.maxent_irl import MaxEntIRL
     from predictors.registry import make_predictor
 
-    walks = noisy_walks(200, np.random.default_rng(0))
-    evidence, costs = _evidence(walks)
+    trajectories = noisy_trajectories(200, np.random.default_rng(0))
+    evidence, costs = _evidence(trajectories)
 
     def gradients() -> int:
         for _ in range(50):
@@ -66,18 +66,20 @@ def reading(
         return 50
 
     def fit() -> int:
-        MaxEntIRL().fit(walks)
+        MaxEntIRL().fit(trajectories)
         return 1
 
     works: dict[str, Callable[[], int]] = {"maxent gradient": gradients, "maxent fit": fit}
-    works |= {key: _updater(make_predictor(name).fit(walks), walks) for key, (name, _) in _UPDATES.items()}
+    works |= {
+        key: _updater(make_predictor(name).fit(trajectories), trajectories) for key, (name, _) in _UPDATES.items()
+    }
     samplers = {key: lambda work=work: 1 / rate(work, settings.seconds) for key, work in works.items()}  # type: ignore[misc]
     agreeing = _agreeing(peers or {}, evidence.loss(costs)[1], [] if remarks is None else remarks)
     samplers |= {name: partial(_seconds_of, peer, settings.seconds) for name, peer in agreeing.items()}
     samples = alternate(samplers, settings.rounds)
     what = {
-        "maxent gradient": "gradient of maximum-entropy IRL, 9x9, 5 goals, 200 walks",
-        "maxent fit": "whole fit of maximum-entropy IRL, 9x9, 5 goals, 200 walks",
+        "maxent gradient": "gradient of maximum-entropy IRL, 9x9, 5 goals, 200 trajectories",
+        "maxent fit": "whole fit of maximum-entropy IRL, 9x9, 5 goals, 200 trajectories",
         **{key: text for key, (_, text) in _UPDATES.items()},
         **_PEERS,
     }
@@ -87,11 +89,11 @@ def reading(
     return [*figures.values(), *ratios]
 
 
-def _evidence(walks: list[Trajectory]) -> tuple[Evidence, npt.NDArray[np.float64]]:
-    """What the likelihood knows of walks in one kitchen, and costs at which to ask it."""
+def _evidence(trajectories: list[Trajectory]) -> tuple[Evidence, npt.NDArray[np.float64]]:
+    """The statistics of trajectories in one kitchen, and costs at which to take the gradient."""
     from predictors.grid.walk_likelihood import collect_evidence
 
-    (evidence,) = collect_evidence(walks).values()
+    (evidence,) = collect_evidence(trajectories).values()
     return evidence, np.full(len(evidence.visits), _COST)
 
 
@@ -113,11 +115,11 @@ def _seconds_of(peer: Peer, seconds: float) -> float:
 
 
 def save_problem(folder: Path) -> Path:
-    """Write what other packages need to compute the gradient of :func:`reading` into a folder.
+    """Write what other packages need to compute the gradient of :func:`prediction_speed` into a folder.
 
-    See ``peer_maxent_irl.py`` beside this file for what is in it.
+    The docstring of ``peer_maxent_irl.py`` beside this file defines its arrays.
     """
-    evidence, costs = _evidence(noisy_walks(200, np.random.default_rng(0)))
+    evidence, costs = _evidence(noisy_trajectories(200, np.random.default_rng(0)))
     graph = evidence.graph
     starts = np.zeros((len(graph.goals), len(costs)))
     np.add.at(starts, (evidence.goals, evidence.starts), evidence.weights)
@@ -136,39 +138,41 @@ def save_problem(folder: Path) -> Path:
     return path
 
 
-def evaluating(settings: Settings) -> list[Figure]:
-    """Seconds that cross-validating every predictor of walks takes in one kitchen."""
+def evaluation_speed(settings: Settings) -> list[Figure]:
+    """Seconds that cross-validating every predictor for kitchens takes in one kitchen."""
     from benchmarks.experiments.prediction.sweep import PREDICTORS
     from predictors.evaluation.cross_validation import evaluate
     from predictors.registry import make_predictor
 
-    walks = noisy_walks(settings.walks, np.random.default_rng(1), drawing=_RING)
+    trajectories = noisy_trajectories(settings.trajectories, np.random.default_rng(1), drawing=_RING)
     named = {setting.label: make_predictor(setting.predictor, **setting.parameters) for setting in PREDICTORS}
     samples = []
     for number in range(settings.evaluations + 1):
         start = time.process_time()
-        evaluate(named, walks, cv=4, repeats=3)
+        evaluate(named, trajectories, cv=4, repeats=3)
         if number:  # the first one compiles
             samples.append(time.process_time() - start)
-    what = f"4-fold x 3 cross-validation of all {len(named)} predictors of walks, 5x9, {len(walks)} walks"
+    what = f"4-fold x 3 cross-validation, {len(named)} kitchen predictors, 5x9, {len(trajectories)} trajectories"
     return [Figure("evaluation", what, "s", tuple(samples))]
 
 
-def _updater(predictor: GoalPredictor, walks: list[Trajectory]) -> Callable[[], int]:
-    def watch() -> int:
+def _updater(predictor: GoalPredictor, trajectories: list[Trajectory]) -> Callable[[], int]:
+    def update() -> int:
         steps = 0
-        for walk in walks[:20]:
-            stream = predictor.stream(walk)
-            for cell in walk.states[:-1]:
+        for trajectory in trajectories[:20]:
+            stream = predictor.stream(trajectory)
+            for cell in trajectory.states[:-1]:
                 stream.update(cell)
                 steps += 1
         return steps
 
-    return watch
+    return update
 
 
-def noisy_walks(count: int, rng: np.random.Generator, stray: float = 0.2, drawing: str = _KITCHEN) -> list[Trajectory]:
-    """Walks of people who take a step nearer to their goal, or with probability ``stray`` any step."""
+def noisy_trajectories(
+    count: int, rng: np.random.Generator, stray: float = 0.2, drawing: str = _KITCHEN
+) -> list[Trajectory]:
+    """Trajectories of steps nearer to the goal or, with probability ``stray``, of any step."""
     from legible_envs.overcooked.layout import OvercookedLayout
     from legible_envs.rollouts.trajectory import Trajectory
     from predictors.grid.base import remaining_steps
@@ -176,7 +180,7 @@ def noisy_walks(count: int, rng: np.random.Generator, stray: float = 0.2, drawin
     layout = OvercookedLayout.from_ascii(drawing)
     goals = tuple(layout.stations)
     away, floor = remaining_steps(layout, goals), np.argwhere(layout.cells == 0)
-    walks = []
+    trajectories = []
     for _ in range(count):
         goal = int(rng.integers(len(goals)))
         row, col = (int(i) for i in rng.choice(floor))
@@ -189,5 +193,5 @@ def noisy_walks(count: int, rng: np.random.Generator, stray: float = 0.2, drawin
             row, col = options[rng.integers(len(options))]
             cells.append((row, col))
         states = np.array([*cells, layout.stations[goals[goal]]])
-        walks.append(Trajectory(states, start="serving", goal=goals[goal], candidates=goals, layout=layout))
-    return walks
+        trajectories.append(Trajectory(states, start="serving", goal=goals[goal], candidates=goals, layout=layout))
+    return trajectories

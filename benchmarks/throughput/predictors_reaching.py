@@ -1,4 +1,4 @@
-"""How fast reaches are aligned and read."""
+"""Speed of alignment and prediction of reaches."""
 
 from __future__ import annotations
 
@@ -12,38 +12,38 @@ from legible_envs.rollouts.trajectory import Trajectory
 if TYPE_CHECKING:
     from benchmarks.throughput.sweep import Settings
 
-__all__ = ["reaches"]
+__all__ = ["reach_speed"]
 
 _GOALS = tuple("abcdefgh")
 
 
-def reaches(settings: Settings) -> list[Figure]:
+def reach_speed(settings: Settings) -> list[Figure]:
     """Seconds per banded and unbanded alignment of two series, and per update of the Gaussian's belief."""
     from predictors import TimeSeriesGaussian
     from predictors.reaching.alignment_kernels import closed_cost
 
     rng = np.random.default_rng(0)
-    walks = _straight_reaches(rng)
+    reaches = _straight_reaches(rng)
     first, second = rng.normal(size=(100, 2)).cumsum(axis=0), rng.normal(size=(120, 2)).cumsum(axis=0)
-    predictors = {str(velocity): TimeSeriesGaussian(velocity=velocity).fit(walks) for velocity in (False, True)}
+    predictors = {str(velocity): TimeSeriesGaussian(velocity=velocity).fit(reaches) for velocity in (False, True)}
 
     def align(radius: int) -> int:
         closed_cost(first, second, radius)
         return 1
 
-    def watch(name: str) -> int:
-        walk = walks[0]
-        stream = predictors[name].stream(walk)
-        for point, time in zip(walk.states, walk.times, strict=True):
+    def update(name: str) -> int:
+        reach = reaches[0]
+        stream = predictors[name].stream(reach)
+        for point, time in zip(reach.states, reach.times, strict=True):
             stream.update(point, time)
-        return walk.num_states
+        return reach.num_states
 
     samples = alternate(
         {
             "dtw": lambda: 1.0 / rate(lambda: align(5), settings.seconds),
             "dtw unbanded": lambda: 1.0 / rate(lambda: align(-1), settings.seconds),
-            "gaussian update": lambda: 1.0 / rate(lambda: watch("False"), settings.seconds),
-            "gaussian velocity update": lambda: 1.0 / rate(lambda: watch("True"), settings.seconds),
+            "gaussian update": lambda: 1.0 / rate(lambda: update("False"), settings.seconds),
+            "gaussian velocity update": lambda: 1.0 / rate(lambda: update("True"), settings.seconds),
         },
         settings.rounds,
     )

@@ -16,8 +16,8 @@ import numpy as np
 from benchmarks.throughput.analysis import machine, result_table, to_markdown
 from benchmarks.throughput.measure import Figure, alternate, rate
 from benchmarks.throughput.peers import IMITATION, IRL_MAXENT, OVERCOOKED_AI, Peer, opened
-from benchmarks.throughput.predictors_grid import evaluating, reading, save_problem
-from benchmarks.throughput.predictors_reaching import reaches
+from benchmarks.throughput.predictors_grid import evaluation_speed, prediction_speed, save_problem
+from benchmarks.throughput.predictors_reaching import reach_speed
 from benchmarks.throughput.sweep import FULL, OPTIMUM_5X5, QUICK, Settings
 from benchmarks.throughput.tabletop import table_drawing, table_games, table_people, table_scoring, table_searching
 
@@ -36,7 +36,7 @@ def run_benchmark(
     out: Path | None = None,
     settings: Settings | None = None,
 ) -> list[Figure]:
-    """Measure everything, print it, and write it as Markdown if asked to.
+    """Measure everything, print it, and write it as Markdown if ``out`` is given.
 
     Args:
         console: Where to print.
@@ -70,10 +70,10 @@ def run_benchmark(
             ("searching tables", lambda: table_searching(settings)),
             ("playing at tables", lambda: table_games(settings)),
             ("drawing tables", lambda: table_drawing(settings)),
-            ("people at tables", lambda: table_people(settings)),
-            ("reading reaches", lambda: reaches(settings)),
-            ("reading people", lambda: reading(settings, running, remarks)),
-            ("judging predictors", lambda: evaluating(settings)),
+            ("participants at tables", lambda: table_people(settings)),
+            ("predicting reaches", lambda: reach_speed(settings)),
+            ("predicting in kitchens", lambda: prediction_speed(settings, running, remarks)),
+            ("evaluating predictors", lambda: evaluation_speed(settings)),
             ("starting", lambda: starting(settings)),
         )
         for name, measure in groups:
@@ -307,7 +307,7 @@ def starting(settings: Settings) -> list[Figure]:
 
 
 def _fresh(code: str, **environment: str) -> tuple[float, ...]:
-    """Numbers that a new Python process prints."""
+    """The numbers that a new Python process prints."""
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, env={**os.environ, **environment}, check=False
     )

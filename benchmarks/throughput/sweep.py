@@ -1,4 +1,4 @@
-"""What the speed benchmark measures, as data: sizes, repeats, and the figures the project promises."""
+"""The settings of the speed benchmark as data: sizes, repeats, and the promised figures."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Settings:
     """Sizes and repeats.
 
     Attributes:
-        rounds: How often each figure is measured; all figures of a group take turns, medians are reported.
+        rounds: Number of samples of each figure; all figures of a group take turns, medians are reported.
         seconds: Duration of one sample of a rate.
         shapes: Kitchens whose scoring is measured.
         batch: Layouts scored per call.
@@ -25,14 +25,14 @@ class Settings:
         optimum_evaluations: Budget of each.
         search_evaluations: Budget of the search whose overhead is measured.
         num_envs: Size of the vector environment.
-        fresh_starts: New processes for import and compile times.
-        walks: Walks that predictors are cross-validated on.
-        evaluations: How often.
+        fresh_starts: Number of new processes for import and compile times.
+        trajectories: Number of trajectories that predictors are cross-validated on.
+        evaluations: Number of cross-validations.
         tables: Tables scored per call.
         table_obstacles: How many obstacles they have, one figure each.
         table_climbs: Random tables, and climbs, of the searches for tables; by default those of the paper.
-        table_episodes: Episodes at tables that are played again and again.
-        table_people: Simulated people per call.
+        table_episodes: Episodes at tables that are replayed.
+        table_people: Simulated participants per call.
     """
 
     rounds: int = 7
@@ -45,7 +45,7 @@ class Settings:
     search_evaluations: int = 200_000
     num_envs: int = 64
     fresh_starts: int = 5
-    walks: int = 500
+    trajectories: int = 500
     evaluations: int = 2
     tables: int = 1024
     table_obstacles: tuple[int, ...] = (0, 3, 4)
@@ -61,7 +61,7 @@ QUICK: Final = Settings(rounds=3, seconds=0.1, oracle_layouts=1, seeds=2, search
 
 @dataclass(frozen=True)
 class Target:
-    """What a figure should be: at least or at most a value."""
+    """A promised bound of a figure, from below or above."""
 
     sense: Literal[">=", "<="]
     value: float

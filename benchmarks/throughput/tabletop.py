@@ -1,4 +1,4 @@
-"""How fast tables are scored, searched, played at, drawn, and reached over by simulated people."""
+"""Speed of tables: scoring, searching, playing, drawing, and simulated participants."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def tables_with(obstacles: int, count: int, seed: int = 0) -> tuple[TabletopWork
         children = workspace.perturb(genomes[waiting], 1, rng, phase=1)
         grown = workspace.num_obstacles(children) > workspace.num_obstacles(genomes[waiting])
         genomes[np.flatnonzero(waiting)[grown]] = children[grown]
-        # Where nothing more fits other cubes are tried.
+        # Where no further obstacle fits, try other cubes.
         stuck = np.flatnonzero(waiting)[~grown & (rng.random(len(grown)) < 0.02)]
         genomes[stuck] = workspace.sample(len(stuck), rng)
     raise RuntimeError(f"no room for {obstacles} obstacles on some of {count} tables")
@@ -122,7 +122,7 @@ def table_searching(settings: Settings) -> list[Figure]:
 
 
 def table_games(settings: Settings) -> list[Figure]:
-    """Steps per second of the table, replaying what simulated people did at tables with four obstacles."""
+    """Steps per second at tables with four obstacles, replaying episodes of simulated participants."""
     kinds: dict[str, tuple[str, dict[str, Any]]] = {
         "table env": ("steps of one table, a person alone", {}),
         "table env belief": ("the same with the built-in Eq. 1 belief", {"predictor": "eq1"}),
@@ -139,7 +139,7 @@ def table_games(settings: Settings) -> list[Figure]:
 
 
 def _episodes(arguments: dict[str, Any], count: int) -> tuple[Any, list[Any], list[list[Deed]]]:
-    """An environment, layouts, and what a person did on each until the task was done."""
+    """An environment, layouts, and a participant's actions on each until the task was done."""
     import gymnasium as gym
 
     import legible_envs  # noqa: F401  (registers)
@@ -151,7 +151,7 @@ def _episodes(arguments: dict[str, Any], count: int) -> tuple[Any, list[Any], li
 
 
 def _deeds(env: Any, layout: Any, seed: int) -> Iterator[Deed]:
-    """Play one episode, and yield each action with the goal it served, without which it would not repeat itself."""
+    """Play one episode, and yield each action with its goal, which a replay needs too."""
     from legible_envs.tabletop.humans.simulation import sample_person
     from legible_envs.tabletop.policies import ReachingPlayer
 
@@ -168,7 +168,7 @@ def _deeds(env: Any, layout: Any, seed: int) -> Iterator[Deed]:
 
 
 def replay(env: Any, layout: Any, seed: int, deeds: Sequence[Deed]) -> bool:
-    """Do again what was done, and say whether the task is done."""
+    """Repeat an episode's actions; whether they complete the task."""
     env.reset(seed=seed, options={"layout": layout})
     table = env.unwrapped
     terminated = False
@@ -219,7 +219,7 @@ def table_drawing(settings: Settings) -> list[Figure]:
 
 
 def table_people(settings: Settings) -> list[Figure]:
-    """Simulated people per second who each do the whole task at a table with four obstacles."""
+    """Simulated participants per second, each doing the whole task at a table with four obstacles."""
     workspace, genomes = tables_with(4, 1)
     rng = np.random.default_rng(0)
 
@@ -228,5 +228,5 @@ def table_people(settings: Settings) -> list[Figure]:
         return settings.table_people
 
     samples = alternate({"table people": lambda: rate(simulate, settings.seconds)}, settings.rounds)
-    what = "simulated people who do the whole task round 4 obstacles"
+    what = "simulated participants who do the whole task round 4 obstacles"
     return [Figure("table people", what, "/s", samples["table people"])]

@@ -38,7 +38,7 @@ CUTS: Final[dict[str, str]] = {
 _SLACK: Final = 1e-9
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class Trajectory:
     """One way from a start to a goal. Immutable, compared by content.
 
@@ -71,35 +71,59 @@ class Trajectory:
     """
 
     states: npt.NDArray[Any]
-    times: npt.NDArray[np.float64] = None  # type: ignore[assignment]
-    start: str = ""
-    goal: str | None = None
-    candidates: tuple[str, ...] = ()
-    participant: str = ""
-    condition: str = ""
-    layout: OvercookedLayout | TabletopLayout | None = None
-    layout_name: str = ""
-    candidate_set: CandidateSet = "all"
-    complete: bool = True
-    goal_positions: tuple[tuple[float, ...], ...] | None = None
+    times: npt.NDArray[np.float64]
+    start: str
+    goal: str | None
+    candidates: tuple[str, ...]
+    participant: str
+    condition: str
+    layout: OvercookedLayout | TabletopLayout | None
+    layout_name: str
+    candidate_set: CandidateSet
+    complete: bool
+    goal_positions: tuple[tuple[float, ...], ...] | None
 
-    def __post_init__(self) -> None:
-        states = _checked_states(self.states)
-        object.__setattr__(self, "states", states)
-        object.__setattr__(self, "times", _checked_times(self.times, len(states)))
-        candidates = (self.candidates,) if isinstance(self.candidates, str) else tuple(self.candidates)
-        object.__setattr__(self, "candidates", candidates)
+    def __init__(
+        self,
+        states: npt.ArrayLike,
+        times: npt.ArrayLike | None = None,
+        start: str = "",
+        goal: str | None = None,
+        candidates: Sequence[str] = (),
+        participant: str = "",
+        condition: str = "",
+        layout: OvercookedLayout | TabletopLayout | None = None,
+        layout_name: str = "",
+        candidate_set: CandidateSet = "all",
+        complete: bool = True,
+        goal_positions: npt.ArrayLike | None = None,
+    ) -> None:
+        checked = _checked_states(states)
+        candidates = (candidates,) if isinstance(candidates, str) else tuple(candidates)
         if not candidates or len(set(candidates)) != len(candidates):
             raise ValueError(f"`candidates` must name at least one goal, each once, got {candidates!r}")
         if not all(isinstance(name, str) and name for name in candidates):
             raise ValueError(f"`candidates` must be non-empty names, got {candidates!r}")
-        if self.goal is not None and self.goal not in candidates:
-            raise ValueError(f"the goal {self.goal!r} is not among the candidates {candidates}")
-        if self.candidate_set not in ("task", "game", "all"):
-            raise ValueError(f"`candidate_set` must be 'task', 'game' or 'all', got {self.candidate_set!r}")
-        if self.goal_positions is not None:
-            positions = _checked_positions(self.goal_positions, len(candidates), states)
-            object.__setattr__(self, "goal_positions", positions)
+        if goal is not None and goal not in candidates:
+            raise ValueError(f"the goal {goal!r} is not among the candidates {candidates}")
+        if candidate_set not in ("task", "game", "all"):
+            raise ValueError(f"`candidate_set` must be 'task', 'game' or 'all', got {candidate_set!r}")
+        self.__dict__.update(
+            states=checked,
+            times=_checked_times(times, len(checked)),
+            start=start,
+            goal=goal,
+            candidates=candidates,
+            participant=participant,
+            condition=condition,
+            layout=layout,
+            layout_name=layout_name,
+            candidate_set=candidate_set,
+            complete=complete,
+            goal_positions=None
+            if goal_positions is None
+            else _checked_positions(goal_positions, len(candidates), checked),
+        )
 
     # -- the observed part --------------------------------------------------------------------------------------------
 
@@ -131,10 +155,20 @@ class Trajectory:
         """The first ``count`` states as a prefix (0: nothing observed yet)."""
         if not 0 <= count <= len(self.states):
             raise ValueError(f"`count` must be 0..{len(self.states)}, got {count}")
-        # Skips the checks: a part of valid states is valid, and predictors cut millions of prefixes.
+        return self.observed(self.states[:count], self.times[:count])
+
+    def observed(self, states: npt.NDArray[Any], times: npt.NDArray[np.float64]) -> Trajectory:
+        """A prefix with the states observed so far in place of this trajectory's own, and all else as here.
+
+        Nothing is checked, which keeps it cheap: predictors cut millions of prefixes, and streams check each point
+        as it comes.
+
+        Args:
+            states: ``(t, d)`` cells (int64) or finite positions (float64).
+            times: ``(t,)`` seconds, never decreasing.
+        """
         part = object.__new__(Trajectory)
-        part.__dict__.update(self.__dict__)
-        part.__dict__.update(states=self.states[:count], times=self.times[:count], complete=False)
+        part.__dict__.update(self.__dict__, states=states, times=times, complete=False)
         part.__dict__.pop("arc_lengths", None)
         return part
 

@@ -1,4 +1,4 @@
-"""Cross-validation of predictors: each trajectory is judged by one that was not fitted on it."""
+"""Cross-validation of predictors: each trajectory is predicted by one that was not fitted on it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import CUTS, Cut, Trajectory
-from predictors.base import FRACTIONS, GoalPredictor, Ties, correctness
+from predictors.base import FRACTIONS, GoalPredictor, TieCredit, correctness
 from predictors.evaluation.metrics import tied_shares
 from predictors.evaluation.results import Evaluation, LearningCurve
 from predictors.evaluation.splits import Groups, check_learnable, folds, nested_training_sets
@@ -39,15 +39,15 @@ def accuracy_at(
     fractions: Sequence[float] = FRACTIONS,
     *,
     cut: Cut = "steps",
-    ties: Ties = "fractional",
+    ties: TieCredit = "fractional",
 ) -> pd.DataFrame:
-    """Judge a fitted predictor on trajectories it has not learned from.
+    """Evaluate a fitted predictor on trajectories it has not learned from.
 
     Args:
         predictor: A fitted predictor.
         X: ``n`` complete trajectories with known goals.
         fractions: ``F`` fractions observed.
-        cut: Fraction of what; see :data:`legible_envs.rollouts.CUTS`.
+        cut: What the fraction is a share of, a key of :data:`legible_envs.rollouts.CUTS`.
         ties: How a true goal that shares the top counts; see :func:`predictors.base.correctness`.
 
     Returns:
@@ -58,45 +58,47 @@ def accuracy_at(
     Raises:
         ValueError: Prefixes, unknown goals, or mixed candidate sets, whose accuracies must not be averaged.
     """
-    walks = list(X)
-    sets = sorted({walk.candidate_set for walk in walks})
+    trajectories = list(X)
+    sets = sorted({trajectory.candidate_set for trajectory in trajectories})
     if len(sets) > 1:
-        raise ValueError(f"trajectories with different candidate sets {sets} must be judged apart")
-    probabilities = predictor.predict_proba_at(walks, fractions, cut)
-    table = _rows(walks, probabilities, predictor.goal_columns(walks), fractions, cut, ties)
+        raise ValueError(f"trajectories with different candidate sets {sets} must be evaluated apart")
+    probabilities = predictor.predict_proba_at(trajectories, fractions, cut)
+    table = _rows(trajectories, probabilities, predictor.goal_columns(trajectories), fractions, cut, ties)
     table.attrs.update(cut=cut, definition=CUTS[cut], ties=ties, candidate_set=sets[0] if sets else None)
     return table
 
 
 def _rows(
-    walks: Sequence[Trajectory],
+    trajectories: Sequence[Trajectory],
     probabilities: npt.NDArray[np.float64],
     goals: npt.NDArray[np.intp],
     fractions: Sequence[float],
     cut: Cut,
-    ties: Ties,
+    ties: TieCredit,
 ) -> pd.DataFrame:
     import pandas as pd
 
-    number, count = len(walks), len(fractions)
+    number, count = len(trajectories), len(fractions)
     return pd.DataFrame(
         {
             "trajectory": np.repeat(np.arange(number), count),
-            "participant": np.repeat([walk.participant for walk in walks], count),
-            "condition": np.repeat([walk.condition for walk in walks], count),
-            "layout": np.repeat([_layout_label(walk) for walk in walks], count),
-            "candidates": np.repeat([len(walk.candidates) for walk in walks], count),
-            "goal": np.repeat([walk.goal or "" for walk in walks], count),
+            "participant": np.repeat([trajectory.participant for trajectory in trajectories], count),
+            "condition": np.repeat([trajectory.condition for trajectory in trajectories], count),
+            "layout": np.repeat([_layout_label(trajectory) for trajectory in trajectories], count),
+            "candidates": np.repeat([len(trajectory.candidates) for trajectory in trajectories], count),
+            "goal": np.repeat([trajectory.goal or "" for trajectory in trajectories], count),
             "fraction": np.tile(np.asarray(fractions, dtype=np.float64), number),
-            "states": [walk.prefix_length(fraction, cut) for walk in walks for fraction in fractions],
+            "states": [
+                trajectory.prefix_length(fraction, cut) for trajectory in trajectories for fraction in fractions
+            ],
             "probability": probabilities[np.arange(number)[:, None], np.arange(count), goals[:, None]].ravel(),
             "correct": correctness(probabilities, goals, ties).ravel(),
         }
     )
 
 
-def _layout_label(walk: Trajectory) -> str:
-    return walk.layout_name or (walk.layout.layout_id if walk.layout is not None else "")
+def _layout_label(trajectory: Trajectory) -> str:
+    return trajectory.layout_name or (trajectory.layout.layout_id if trajectory.layout is not None else "")
 
 
 # -- cross-validation -------------------------------------------------------------------------------------------------
@@ -110,13 +112,13 @@ def evaluate(
     repeats: int = 3,
     fractions: Sequence[float] = FRACTIONS,
     cut: Cut = "steps",
-    ties: Ties = "fractional",
+    ties: TieCredit = "fractional",
     groups: Groups | None = None,
     by: Part | None = None,
     rare: Literal["error", "keep"] = "error",
     seed: int | np.random.Generator = 0,
 ) -> Evaluation:
-    """Judge predictors by stratified cross-validation: every trajectory is predicted once per repeat, unseen.
+    """Evaluate predictors by stratified cross-validation: every trajectory is predicted once per repeat, unseen.
 
     All predictors see the same splits.
 
@@ -127,11 +129,11 @@ def evaluate(
         cv: Folds, in each of which every goal has its share.
         repeats: How often, with other splits.
         fractions: Fractions observed.
-        cut: Fraction of what; see :data:`legible_envs.rollouts.CUTS`.
+        cut: What the fraction is a share of, a key of :data:`legible_envs.rollouts.CUTS`.
         ties: How a true goal that shares the top counts; see :func:`predictors.base.correctness`.
-        groups: ``"participant"``: nobody is both learned from and judged. None: trajectories are split singly.
-        by: ``"condition"`` or ``"layout"``: learn and judge within each apart, as for comparing layouts.
-        rare: ``"error"`` refuses goals with fewer examples than folds; ``"keep"`` judges them all the same.
+        groups: ``"participant"``: no participant is on both sides of a split. None: trajectories are split singly.
+        by: ``"condition"`` or ``"layout"``: fit and evaluate within each apart, as for comparing layouts.
+        rare: ``"error"`` refuses goals with fewer examples than folds; ``"keep"`` evaluates on them all the same.
         seed: Of the splits.
 
     Returns:
@@ -140,29 +142,29 @@ def evaluate(
     Raises:
         PredictorError: A predictor that cannot be found or made.
         ValueError: Trajectories that cannot be split so, with the reason; unknown options.
-        TypeError: Something else than trajectories.
+        TypeError: Samples that are not trajectories.
     """
     import pandas as pd
     from sklearn.base import clone
 
-    walks = list(X)
-    check_learnable(walks)
+    trajectories = list(X)
+    check_learnable(trajectories)
     _check_options(fractions, cut, repeats)
     named = _named(predictors)
-    parts = _parts(walks, by)
+    parts = _parts(trajectories, by)
     rng = np.random.default_rng(seed)
     tables, confusions = [], []
     for part, members in parts.items():
         for repeat in range(repeats):
             try:
-                splits = list(folds([walks[i] for i in members], cv, rng, groups=groups, rare=rare))
+                splits = list(folds([trajectories[i] for i in members], cv, rng, groups=groups, rare=rare))
             except ValueError as error:
                 raise ValueError(f"{by} {part!r}: {error}" if by else str(error)) from error
             for fold, (train, test) in enumerate(splits):
-                learned, judged = ([walks[members[i]] for i in half] for half in (train, test))
+                learned, held_out = ([trajectories[members[i]] for i in half] for half in (train, test))
                 for name, predictor in named.items():
                     fitted = clone(predictor).fit(learned)
-                    rows, confusion = _judge(fitted, judged, fractions, cut, ties)
+                    rows, confusion = _predict_rows(fitted, held_out, fractions, cut, ties)
                     rows["trajectory"] = members[test][rows["trajectory"].to_numpy()]
                     labels = {"predictor": name, "repeat": repeat, "fold": fold}
                     tables.append(_labelled(rows, labels))
@@ -172,7 +174,7 @@ def evaluate(
         confusion=pd.concat(confusions, ignore_index=True),
         cut=cut,
         ties=ties,
-        candidate_set=walks[0].candidate_set,
+        candidate_set=trajectories[0].candidate_set,
         cv=cv,
         repeats=repeats,
         groups=groups,
@@ -209,22 +211,27 @@ def _named(specs: Specs) -> dict[str, GoalPredictor]:
     return named
 
 
-def _parts(walks: Sequence[Trajectory], by: Part | None) -> dict[str, npt.NDArray[np.intp]]:
+def _parts(trajectories: Sequence[Trajectory], by: Part | None) -> dict[str, npt.NDArray[np.intp]]:
     if by not in (None, "condition", "layout"):
         raise ValueError(f"`by` must be 'condition', 'layout' or None, got {by!r}")
-    labels = np.array([walk.condition if by == "condition" else _layout_label(walk) if by else "" for walk in walks])
+    labels = np.array(
+        [
+            trajectory.condition if by == "condition" else _layout_label(trajectory) if by else ""
+            for trajectory in trajectories
+        ]
+    )
     return {str(label): np.flatnonzero(labels == label) for label in dict.fromkeys(labels.tolist())}
 
 
-def _judge(
-    predictor: GoalPredictor, walks: Sequence[Trajectory], fractions: Sequence[float], cut: Cut, ties: Ties
+def _predict_rows(
+    predictor: GoalPredictor, trajectories: Sequence[Trajectory], fractions: Sequence[float], cut: Cut, ties: TieCredit
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Rows as of :func:`accuracy_at` with ``confidence``, and confusions as ``fraction, goal, predicted, count``."""
     import pandas as pd
 
-    probabilities = predictor.predict_proba_at(walks, fractions, cut)
-    goals = predictor.goal_columns(walks)
-    rows = _rows(walks, probabilities, goals, fractions, cut, ties)
+    probabilities = predictor.predict_proba_at(trajectories, fractions, cut)
+    goals = predictor.goal_columns(trajectories)
+    rows = _rows(trajectories, probabilities, goals, fractions, cut, ties)
     rows["confidence"] = probabilities.max(axis=-1).ravel()
     names = np.asarray(predictor.classes_)
     counts = np.zeros((len(fractions), len(names), len(names)))
@@ -260,13 +267,13 @@ def learning_curve(
     repeats: int = 5,
     fractions: Sequence[float] = FRACTIONS,
     cut: Cut = "steps",
-    ties: Ties = "fractional",
+    ties: TieCredit = "fractional",
     groups: Groups | None = None,
     seed: int | np.random.Generator = 0,
 ) -> LearningCurve:
     """How accuracy grows with the number of trajectories learned from.
 
-    In each repeat a fixed share is held out and judged; training sets are nested, and without groups hold goals in
+    In each repeat a fixed share is held out to evaluate on; training sets are nested, and without groups hold goals in
     proportion.
 
     Args:
@@ -277,40 +284,40 @@ def learning_curve(
         test_share: Share held out.
         repeats: How often, with other splits.
         fractions: Fractions observed.
-        cut: Fraction of what; see :data:`legible_envs.rollouts.CUTS`.
+        cut: What the fraction is a share of, a key of :data:`legible_envs.rollouts.CUTS`.
         ties: As for :func:`evaluate`.
         groups: As for :func:`evaluate`.
         seed: Of the splits.
 
     Raises:
         ValueError: Sizes that are no sizes or larger than what is left to learn from; goals that the smallest training
-            set has not heard of; and as for :func:`evaluate`.
+            set does not mention; and as for :func:`evaluate`.
     """
     import pandas as pd
     from sklearn.base import clone
 
-    walks = list(X)
-    check_learnable(walks)
+    trajectories = list(X)
+    check_learnable(trajectories)
     _check_options(fractions, cut, repeats)
     named = _named(predictors)
     rng = np.random.default_rng(seed)
     rows = []
-    splits = [nested_training_sets(walks, test_share, rng, groups) for _ in range(repeats)]
+    splits = [nested_training_sets(trajectories, test_share, rng, groups) for _ in range(repeats)]
     # Groups are of different sizes: the smallest pool decides, so that every repeat has the same training sizes.
     counts = _sizes(sizes, min(len(pool) for pool, _ in splits))
     for repeat, (pool, test) in enumerate(splits):
-        judged = [walks[i] for i in test]
+        held_out = [trajectories[i] for i in test]
         for size in counts:
-            learned = [walks[i] for i in pool[:size]]
-            _check_known(learned, judged)
+            learned = [trajectories[i] for i in pool[:size]]
+            _check_known(learned, held_out)
             for name, predictor in named.items():
                 fitted = clone(predictor).fit(learned)
-                probabilities = fitted.predict_proba_at(judged, fractions, cut)
-                correct = correctness(probabilities, fitted.goal_columns(judged), ties).mean(axis=0)
+                probabilities = fitted.predict_proba_at(held_out, fractions, cut)
+                correct = correctness(probabilities, fitted.goal_columns(held_out), ties).mean(axis=0)
                 for fraction, accuracy in zip(fractions, correct, strict=True):
-                    rows.append((name, repeat, size, len(judged), float(fraction), float(accuracy)))
+                    rows.append((name, repeat, size, len(held_out), float(fraction), float(accuracy)))
     columns = ["predictor", "repeat", "size", "judged", "fraction", "accuracy"]
-    return LearningCurve(pd.DataFrame(rows, columns=columns), cut, ties, walks[0].candidate_set, test_share)
+    return LearningCurve(pd.DataFrame(rows, columns=columns), cut, ties, trajectories[0].candidate_set, test_share)
 
 
 def _sizes(sizes: Sequence[int | float], available: int) -> list[int]:
@@ -326,8 +333,8 @@ def _sizes(sizes: Sequence[int | float], available: int) -> list[int]:
     return sorted(set(found))
 
 
-def _check_known(learned: Sequence[Trajectory], judged: Sequence[Trajectory]) -> None:
-    known = {name for walk in learned for name in walk.candidates}
-    unknown = sorted({name for walk in judged for name in walk.candidates} - known)
+def _check_known(learned: Sequence[Trajectory], held_out: Sequence[Trajectory]) -> None:
+    known = {name for trajectory in learned for name in trajectory.candidates}
+    unknown = sorted({name for trajectory in held_out for name in trajectory.candidates} - known)
     if unknown:
         raise ValueError(f"{len(learned)} trajectories to learn from never mention goals {unknown}; use larger sizes")

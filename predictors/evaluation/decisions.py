@@ -1,8 +1,8 @@
-"""Acting on a prediction: when is a robot sure enough?
+"""Acting on a prediction: at which confidence should a robot act?
 
 >>> from predictors import BayesianGoalPredictor, ThresholdDecision                  # doctest: +SKIP
->>> decision = ThresholdDecision(BayesianGoalPredictor().fit(walks), 0.8)            # doctest: +SKIP
->>> watcher = decision.stream(walks[0])                                              # doctest: +SKIP
+>>> decision = ThresholdDecision(BayesianGoalPredictor().fit(trajectories), 0.8)     # doctest: +SKIP
+>>> watcher = decision.stream(trajectories[0])                                       # doctest: +SKIP
 >>> watcher.update((3, 2))                                                           # doctest: +SKIP
 >>> watcher.update((2, 2))                                                           # doctest: +SKIP
 Decision(goal='onion', probability=0.83, step=2, time=0.15)
@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import Trajectory
-from predictors.base import TIE_TOLERANCE, GoalPredictor
+from predictors.base import TIE_TOLERANCE, GoalPredictor, check_trajectories
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -28,12 +28,12 @@ __all__ = ["Decision", "DecisionStream", "ThresholdDecision", "summarise_decisio
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """That a person is going for a goal.
+    """The goal that a robot acts on.
 
     Attributes:
-        goal: Which one.
+        goal: Its name.
         probability: The belief in it when it was decided.
-        step: How many states had been seen, counted from 1.
+        step: Number of states observed by then, at least 1.
         time: Time of the last of them, as given with it.
     """
 
@@ -46,18 +46,18 @@ class Decision:
 class ThresholdDecision:
     """Decides as soon as one goal is at least as probable as a threshold, and stays with it.
 
-    Works with every predictor, each used causally: what it decides after a state depends on that state and those
-    before. Goals tied at the top decide nothing, whatever the threshold; nor does a belief before the first state.
+    Works with every predictor, and causally: a decision after a state depends on that state and those before. Goals
+    tied at the top lead to no decision, whatever the threshold; nor does the belief before the first state.
 
     Args:
         predictor: A fitted predictor.
-        threshold: Probability ``p``, above 0 and up to 1, at which to act. Early and often wrong, or late and right:
-            :meth:`trade_off` shows what a threshold buys.
-        patience: How many states in a row the same goal must be above the threshold.
+        threshold: Probability ``p``, above 0 and up to 1, at which to act. A low one decides early and is often wrong,
+            a high one late and right: :meth:`trade_off` shows the curve.
+        patience: Number of consecutive states at which the same goal must reach the threshold.
 
     Raises:
         ValueError: A threshold or patience out of range.
-        TypeError: Something else than a predictor.
+        TypeError: ``predictor`` is not a :class:`~predictors.base.GoalPredictor`.
     """
 
     def __init__(self, predictor: GoalPredictor, threshold: float = 0.9, *, patience: int = 1) -> None:
@@ -73,27 +73,27 @@ class ThresholdDecision:
         return f"ThresholdDecision({self.predictor!r}, {self.threshold!r}, patience={self.patience})"
 
     def stream(self, context: Trajectory) -> DecisionStream:
-        """Watch one person as they move.
+        """Decide about one person while they move.
 
         Args:
-            context: What is known beforehand: start, candidates, layout. Its states are not looked at.
+            context: What is known beforehand: start, candidates, layout. Its states are ignored.
         """
         return DecisionStream(self, context)
 
     def decide(self, X: Sequence[Trajectory]) -> pd.DataFrame:
-        """When it would have acted on whole trajectories, and whether rightly.
+        """When the rule would have acted on whole trajectories, and whether it would have been right.
 
-        Of a complete trajectory the last state is not shown: it is the goal's own, too late for a decision.
+        The last state of a complete trajectory is left out: it is the goal's own, too late for a decision.
 
         Args:
-            X: ``n`` complete trajectories (or prefixes, all of whose states are shown).
+            X: ``n`` complete trajectories (or prefixes, of which all states are used).
 
         Returns:
             A row per trajectory: ``trajectory`` (its number), ``participant``, ``condition``, ``layout``, ``goal``,
             ``threshold``, ``decided`` (bool), ``decision`` (the goal decided on, ``""`` if none), ``probability``,
-            ``step`` (states seen; 0 if none), ``fraction`` (of all states, the goal's own included), ``time`` (since
-            the first state), ``lead`` (time left until the last state) — NaN if none — and ``correct`` (1 or 0;
-            undecided is 0, NaN where the goal is not known).
+            ``step`` (states observed; 0 if none), ``fraction`` (of all states, the goal's own included), ``time``
+            (since the first state), ``lead`` (time left until the last state) — NaN if none — and ``correct``
+            (1 or 0; undecided is 0, NaN where the goal is not known).
         """
         return self.trade_off(X, [self.threshold])
 
@@ -102,43 +102,51 @@ class ThresholdDecision:
         import pandas as pd
 
         levels = [_checked_threshold(threshold) for threshold in thresholds]
-        walks = GoalPredictor._check_trajectories(X)
-        beliefs = self._beliefs(walks)
+        trajectories = check_trajectories(X)
+        beliefs = self._beliefs(trajectories)
         rows = [
-            _row(number, walk, level, self._first_decision(walk, belief, level))
+            _row(number, trajectory, level, self._first_decision(trajectory, belief, level))
             for level in levels
-            for number, (walk, belief) in enumerate(zip(walks, beliefs, strict=True))
+            for number, (trajectory, belief) in enumerate(zip(trajectories, beliefs, strict=True))
         ]
-        return pd.DataFrame(rows, columns=list(_row(0, _NOBODY, 1.0, None)))
+        return pd.DataFrame(rows, columns=list(_row(0, _UNKNOWN, 1.0, None)))
 
-    def _beliefs(self, walks: Sequence[Trajectory]) -> list[npt.NDArray[np.float64]]:
+    def _beliefs(self, trajectories: Sequence[Trajectory]) -> list[npt.NDArray[np.float64]]:
         """For each trajectory ``(steps, candidates)`` the belief after 1, 2, … states."""
-        steps = [walk.num_states - walk.complete for walk in walks]
-        prefixes = [walk.first(t) for walk, count in zip(walks, steps, strict=True) for t in range(1, count + 1)]
+        steps = [trajectory.num_states - trajectory.complete for trajectory in trajectories]
+        prefixes = [
+            trajectory.first(t)
+            for trajectory, count in zip(trajectories, steps, strict=True)
+            for t in range(1, count + 1)
+        ]
         rows = self.predictor.predict_proba(prefixes) if prefixes else np.zeros((0, 0))
         ends = np.cumsum([max(count, 0) for count in steps], dtype=np.intp)
         return [
-            rows[end - max(count, 0) : end][:, self.predictor._columns(walk)] if count > 0 else np.zeros((0, 0))
-            for walk, count, end in zip(walks, steps, ends, strict=True)
+            rows[end - max(count, 0) : end][:, self.predictor.candidate_columns(trajectory)]
+            if count > 0
+            else np.zeros((0, 0))
+            for trajectory, count, end in zip(trajectories, steps, ends, strict=True)
         ]
 
-    def _first_decision(self, walk: Trajectory, beliefs: npt.NDArray[np.float64], threshold: float) -> Decision | None:
+    def _first_decision(
+        self, trajectory: Trajectory, beliefs: npt.NDArray[np.float64], threshold: float
+    ) -> Decision | None:
         previous, count = None, 0
         for step, belief in enumerate(beliefs, 1):
-            top = _sure_of(belief, threshold)
+            top = _confident_candidate(belief, threshold)
             count = 0 if top is None else count + 1 if top == previous else 1
             previous = top
             if top is not None and count >= self.patience:
-                return Decision(walk.candidates[top], float(belief[top]), step, float(walk.times[step - 1]))
+                return Decision(trajectory.candidates[top], float(belief[top]), step, float(trajectory.times[step - 1]))
         return None
 
 
 class DecisionStream:
-    """Watches one person until it is sure; made by :meth:`ThresholdDecision.stream`.
+    """Follows one person until it decides; made by :meth:`ThresholdDecision.stream`.
 
     Attributes:
         belief: ``{goal: probability}`` after the last update; the prior before the first.
-        decision: What was decided, or None so far.
+        decision: The decision, None until there is one.
     """
 
     def __init__(self, rule: ThresholdDecision, context: Trajectory) -> None:
@@ -155,10 +163,10 @@ class DecisionStream:
 
         Args:
             point: ``(d,)`` cell or position. Standing still on a cell of a grid adds nothing.
-            time: When, in seconds; one after the other without it.
+            time: When, in seconds; one second after the state before if None.
 
         Returns:
-            The decision once there is one, the same ever after; None until then.
+            The decision, the same from then on; None until there is one.
 
         Raises:
             ValueError: What :meth:`predictors.base.GoalStream.update` rejects.
@@ -168,7 +176,7 @@ class DecisionStream:
         if self.decision is not None or self._stream.num_states == seen:
             return self.decision
         values = np.array([self.belief[goal] for goal in self._goals])
-        top = _sure_of(values, self._rule.threshold)
+        top = _confident_candidate(values, self._rule.threshold)
         self._count = 0 if top is None else self._count + 1 if top == self._top else 1
         self._top = top
         if top is not None and self._count >= self._rule.patience:
@@ -178,16 +186,16 @@ class DecisionStream:
 
 
 def summarise_decisions(rows: pd.DataFrame, by: Sequence[str] = ("threshold",)) -> pd.DataFrame:
-    """What decisions are worth on average.
+    """Coverage, accuracy and timing of decisions, on average.
 
     Args:
         rows: From :meth:`ThresholdDecision.decide` or :meth:`ThresholdDecision.trade_off`.
-        by: Columns to tell apart, such as ``("condition", "threshold")``.
+        by: Columns to group by, such as ``("condition", "threshold")``.
 
     Returns:
-        A row per group: the columns ``by``, ``trajectories``, ``decided`` (share), ``correct`` (share of all that were
-        decided rightly), ``precision`` (share of the decisions), and the means over decisions of ``fraction``,
-        ``step``, ``time`` and ``lead`` (NaN without any).
+        A row per group: the columns ``by``, ``trajectories``, ``decided`` (share), ``correct`` (right decisions as a
+        share of all trajectories), ``precision`` (as a share of the decisions), and the means over decisions of
+        ``fraction``, ``step``, ``time`` and ``lead`` (NaN without any).
     """
     made = rows[rows["decided"]]
     keys = list(by)
@@ -204,32 +212,32 @@ def summarise_decisions(rows: pd.DataFrame, by: Sequence[str] = ("threshold",)) 
     return means.join(of_decisions).reset_index()
 
 
-_NOBODY: Final = Trajectory(np.zeros((0, 2), dtype=np.int64), candidates=("nothing",))
+_UNKNOWN: Final = Trajectory(np.zeros((0, 2), dtype=np.int64), candidates=("nothing",))
 
 
-def _row(number: int, walk: Trajectory, threshold: float, decision: Decision | None) -> dict[str, Any]:
+def _row(number: int, trajectory: Trajectory, threshold: float, decision: Decision | None) -> dict[str, Any]:
     nan = float("nan")
-    first, last = (float(walk.times[0]), float(walk.times[-1])) if walk.num_states else (nan, nan)
-    right = None if decision is None else decision.goal == walk.goal
+    first, last = (float(trajectory.times[0]), float(trajectory.times[-1])) if trajectory.num_states else (nan, nan)
+    right = None if decision is None else decision.goal == trajectory.goal
     return {
         "trajectory": number,
-        "participant": walk.participant,
-        "condition": walk.condition,
-        "layout": walk.layout_name or (walk.layout.layout_id if walk.layout is not None else ""),
-        "goal": walk.goal or "",
+        "participant": trajectory.participant,
+        "condition": trajectory.condition,
+        "layout": trajectory.layout_name or (trajectory.layout.layout_id if trajectory.layout is not None else ""),
+        "goal": trajectory.goal or "",
         "threshold": threshold,
         "decided": decision is not None,
         "decision": "" if decision is None else decision.goal,
         "probability": nan if decision is None else decision.probability,
         "step": 0 if decision is None else decision.step,
-        "fraction": nan if decision is None else decision.step / walk.num_states,
+        "fraction": nan if decision is None else decision.step / trajectory.num_states,
         "time": nan if decision is None else decision.time - first,
         "lead": nan if decision is None else last - decision.time,
-        "correct": nan if walk.goal is None else float(bool(right)),
+        "correct": nan if trajectory.goal is None else float(bool(right)),
     }
 
 
-def _sure_of(belief: npt.NDArray[np.float64], threshold: float) -> int | None:
+def _confident_candidate(belief: npt.NDArray[np.float64], threshold: float) -> int | None:
     """The candidate that is alone at the top and at least as probable as the threshold."""
     best = belief.max()
     if best < threshold - TIE_TOLERANCE or np.count_nonzero(belief >= best - TIE_TOLERANCE) > 1:

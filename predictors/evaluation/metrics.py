@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from predictors.base import TIE_TOLERANCE, Ties
+from predictors.base import TIE_TOLERANCE, TieCredit
 
 __all__ = ["CALIBRATION_BINS", "calibration_error", "clustered_interval", "log_loss", "tied_shares", "weighted_scores"]
 
@@ -15,7 +15,7 @@ CALIBRATION_BINS: Final = 10
 """Equal-width bins of confidence that the calibration error looks at."""
 
 
-def tied_shares(probabilities: npt.NDArray[np.float64], ties: Ties = "fractional") -> npt.NDArray[np.float64]:
+def tied_shares(probabilities: npt.NDArray[np.float64], ties: TieCredit = "fractional") -> npt.NDArray[np.float64]:
     """How much of a prediction goes to each goal: 1 to the top one, 1/k to each of ``k`` tied ones.
 
     Args:
@@ -77,7 +77,7 @@ def calibration_error(
 def clustered_interval(
     values: npt.NDArray[np.float64], units: npt.NDArray[np.integer], level: float = 0.95
 ) -> tuple[float, float, float]:
-    """A mean and its confidence interval where values of one unit (a person) go together.
+    """A mean and its confidence interval where values of one unit (a participant) depend on each other.
 
     The mean is over values; its variance sums the units' total deviations (cluster-robust, with factor
     ``m/(m-1)`` for ``m`` units) and the quantile is Student's with ``m - 1`` degrees of freedom. With one value per

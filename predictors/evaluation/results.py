@@ -26,15 +26,15 @@ class Evaluation:
         table: A row per predictor, repeat, trajectory and fraction observed: ``predictor, repeat, fold, trajectory,
             participant, condition, layout, candidates, goal, fraction, states, probability`` (of the true goal),
             ``correct`` (0 to 1, ties shared out), ``confidence`` (probability of the top goal).
-        confusion: ``predictor, repeat, fold`` (and what was judged apart), ``fraction, goal, predicted, count``; a
+        confusion: ``predictor, repeat, fold`` (and what ``by`` names), ``fraction, goal, predicted, count``; a
             prediction tied between ``k`` goals counts 1/k for each.
         cut: What "fraction observed" is a fraction of.
         ties: How ties count.
         candidate_set: Which goals count as possible.
         cv: Folds.
         repeats: Repeats.
-        groups: What was kept together in splits.
-        by: What was learned and judged apart.
+        groups: What was kept on one side of every split.
+        by: Within the parts of what the predictors were fitted and evaluated: ``"condition"``, ``"layout"`` or None.
     """
 
     table: pd.DataFrame = field(repr=False)
@@ -72,7 +72,7 @@ class Evaluation:
 
     @property
     def keys(self) -> list[str]:
-        """Columns that tell results apart: ``predictor``, and what was judged apart."""
+        """Columns that identify a result: ``predictor``, and what ``by`` names."""
         return ["predictor", *([self.by] if self.by else [])]
 
     def accuracy(self, *, level: float = 0.95, unit: str | None = None) -> pd.DataFrame:
@@ -86,7 +86,7 @@ class Evaluation:
                 participants if all are named.
 
         Returns:
-            ``predictor`` (and what was judged apart), ``fraction, accuracy, low, high, chance, trajectories, units``,
+            ``predictor`` (and what ``by`` names), ``fraction, accuracy, low, high, chance, trajectories, units``,
             with ``unit`` and ``level`` in ``.attrs``.
 
         Raises:
@@ -116,7 +116,7 @@ class Evaluation:
         """All figures of merit against fraction observed.
 
         Returns:
-            ``predictor`` (and what was judged apart), ``fraction, accuracy, precision, recall, f1`` (weighted by goal),
+            ``predictor`` (and what ``by`` names), ``fraction, accuracy, precision, recall, f1`` (weighted by goal),
             ``log_loss, calibration_error``; each is the mean over repeats.
         """
         import pandas as pd
@@ -138,7 +138,7 @@ class Evaluation:
         return self._describe(means)
 
     def summary(self) -> pd.DataFrame:
-        """A row per predictor (and what was judged apart): the means of :meth:`metrics` over fractions."""
+        """A row per predictor (and what ``by`` names): the means of :meth:`metrics` over fractions."""
         means = self.metrics().drop(columns="fraction").groupby(self.keys, sort=False, as_index=False).mean()
         counts = self.table.groupby(self.keys, sort=False, as_index=False).agg(
             trajectories=("trajectory", "nunique"), participants=("participant", "nunique")
@@ -148,13 +148,13 @@ class Evaluation:
     def confusion_matrix(
         self, predictor: str | None = None, *, fraction: float | None = None, normalise: bool = False, **part: str
     ) -> pd.DataFrame:
-        """Which goals are taken for which.
+        """Which goals are confused with which.
 
         Args:
-            predictor: Whose; may be left out if there is one.
+            predictor: Its name; may be left out if there is only one.
             fraction: At which fraction; None averages over all.
             normalise: Rows as shares rather than trajectories.
-            part: ``condition=`` or ``layout=``, if these were judged apart.
+            part: ``condition=`` or ``layout=``, if ``by`` names it.
 
         Returns:
             Rows are true goals, columns predicted ones, in trajectories (repeats averaged).
@@ -166,11 +166,11 @@ class Evaluation:
 
         chosen = self.confusion
         if predictor is None and len(self.predictors) > 1:
-            raise ValueError(f"say whose confusion matrix: one of {self.predictors}")
+            raise ValueError(f"name the predictor of the confusion matrix: one of {self.predictors}")
         wanted = {"predictor": predictor or self.predictors[0], **part}
         for column, value in wanted.items():
             if column not in self.keys or value not in set(chosen[column]):
-                raise ValueError(f"nothing was judged with {column} = {value!r}")
+                raise ValueError(f"no predictions were evaluated with {column} = {value!r}")
             chosen = chosen[chosen[column] == value]
         if fraction is not None:
             chosen = chosen[np.isclose(chosen["fraction"], fraction)]
@@ -214,8 +214,8 @@ class LearningCurve:
     """What :func:`predictors.evaluation.learning_curve` found.
 
     Attributes:
-        table: ``predictor, repeat, size`` (trajectories learned from), ``judged`` (trajectories held out), ``fraction,
-            accuracy``.
+        table: ``predictor, repeat, size`` (trajectories learned from), ``judged`` (number held out to evaluate on),
+            ``fraction, accuracy``.
         cut: What "fraction observed" is a fraction of.
         ties: How ties count.
         candidate_set: Which goals count as possible.

@@ -1,4 +1,4 @@
-"""Which trajectories are learned from and which are judged."""
+"""Which trajectories a predictor learns from and which it is evaluated on."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Split = tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]
 
 
 def folds(
-    walks: Sequence[Trajectory],
+    trajectories: Sequence[Trajectory],
     cv: int,
     rng: np.random.Generator,
     *,
@@ -28,26 +28,26 @@ def folds(
     """Training and test numbers of a stratified k-fold split.
 
     Args:
-        walks: ``n`` trajectories with known goals.
+        trajectories: ``n`` trajectories with known goals.
         cv: Number of folds ``k``.
-        rng: Where the shuffle comes from.
-        groups: ``"participant"`` keeps all trajectories of a person in one fold.
+        rng: Of the shuffle.
+        groups: ``"participant"`` keeps all trajectories of a participant in one fold.
         rare: Whether goals with fewer examples than folds are refused or kept; kept ones are absent from some folds,
-            and a goal's only example is judged without one to learn from.
+            and a goal's only example is evaluated without one to learn from.
 
     Yields:
-        ``k`` pairs of numbers into ``walks``, sorted.
+        ``k`` pairs of numbers into ``trajectories``, sorted.
 
     Raises:
         ValueError: Too few trajectories, goals or participants; see above.
     """
     from sklearn.model_selection import StratifiedGroupKFold, StratifiedKFold
 
-    goals = check_learnable(walks)
+    goals = check_learnable(trajectories)
     if isinstance(cv, bool) or not isinstance(cv, int | np.integer) or cv < 2:
         raise ValueError(f"`cv` must be a number of folds >= 2, got {cv!r}")
-    if len(walks) < cv:
-        raise ValueError(f"{cv} folds need at least {cv} trajectories, got {len(walks)}")
+    if len(trajectories) < cv:
+        raise ValueError(f"{cv} folds need at least {cv} trajectories, got {len(trajectories)}")
     if rare not in ("error", "keep"):
         raise ValueError(f"`rare` must be 'error' or 'keep', got {rare!r}")
     few = {goal: count for goal, count in sorted(Counter(goals).items()) if count < cv}
@@ -57,75 +57,77 @@ def folds(
             "keep them with rare='keep'"
         )
     seed = int(rng.integers(2**31))
-    people: list[str] | None = None
+    participants: list[str] | None = None
     if groups is None:
-        if min(len(walks), max(Counter(goals).values())) < cv:
+        if min(len(trajectories), max(Counter(goals).values())) < cv:
             raise ValueError(f"no goal has an example for each of the {cv} folds; use fewer folds")
         splitter: Any = StratifiedKFold(cv, shuffle=True, random_state=seed)
     elif groups == "participant":
-        people = [walk.participant for walk in walks]
-        if "" in people:
-            raise ValueError(f"trajectory {people.index('')} names no participant to group by; use groups=None")
-        if len(set(people)) < cv:
-            raise ValueError(f"{cv} folds need at least {cv} participants, got {len(set(people))}")
+        participants = [trajectory.participant for trajectory in trajectories]
+        if "" in participants:
+            raise ValueError(f"trajectory {participants.index('')} names no participant to group by; use groups=None")
+        if len(set(participants)) < cv:
+            raise ValueError(f"{cv} folds need at least {cv} participants, got {len(set(participants))}")
         splitter = StratifiedGroupKFold(cv, shuffle=True, random_state=seed)
     else:
         raise ValueError(f"`groups` must be 'participant' or None, got {groups!r}")
-    for train, test in _quietly(splitter, goals, people):
-        _check_fold([walks[i] for i in train], [walks[i] for i in test])
+    for train, test in _quietly(splitter, goals, participants):
+        _check_fold([trajectories[i] for i in train], [trajectories[i] for i in test])
         yield train, test
 
 
-def _quietly(splitter: Any, goals: Sequence[str], people: Sequence[str] | None) -> list[Split]:
+def _quietly(splitter: Any, goals: Sequence[str], participants: Sequence[str] | None) -> list[Split]:
     """The splits, without scikit-learn's warning about rare goals that were asked for."""
     import warnings
 
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="The least populated class")
-        return [(np.sort(a), np.sort(b)) for a, b in splitter.split(np.zeros(len(goals)), list(goals), people)]
+        return [(np.sort(a), np.sort(b)) for a, b in splitter.split(np.zeros(len(goals)), list(goals), participants)]
 
 
-def check_learnable(walks: Sequence[Trajectory]) -> list[str]:
+def check_learnable(trajectories: Sequence[Trajectory]) -> list[str]:
     """The goals of trajectories between which there is something to tell apart.
 
     Raises:
-        TypeError: Something else than trajectories.
+        TypeError: Samples that are not trajectories.
         ValueError: None, prefixes, unknown goals, mixed candidate sets, or one goal only.
     """
-    if not walks:
+    if not trajectories:
         raise ValueError("no trajectories to evaluate on")
     goals = []
-    for number, walk in enumerate(walks):
-        if not isinstance(walk, Trajectory):
-            raise TypeError(f"expected trajectories, got {type(walk).__name__} at index {number}")
-        if walk.goal is None:
-            raise ValueError(f"trajectory {number} has no known goal to judge by")
-        if not walk.complete:
+    for number, trajectory in enumerate(trajectories):
+        if not isinstance(trajectory, Trajectory):
+            raise TypeError(f"expected trajectories, got {type(trajectory).__name__} at index {number}")
+        if trajectory.goal is None:
+            raise ValueError(f"trajectory {number} has no known goal to compare with")
+        if not trajectory.complete:
             raise ValueError(f"trajectory {number} is a prefix; give complete trajectories")
-        goals.append(walk.goal)
-    sets = sorted({walk.candidate_set for walk in walks})
+        goals.append(trajectory.goal)
+    sets = sorted({trajectory.candidate_set for trajectory in trajectories})
     if len(sets) > 1:
-        raise ValueError(f"trajectories with different candidate sets {sets} must be judged apart")
+        raise ValueError(f"trajectories with different candidate sets {sets} must be evaluated apart")
     if len(set(goals)) == 1:
         raise ValueError(f"all {len(goals)} trajectories go to {goals[0]!r}; there is nothing to tell apart")
     return goals
 
 
 def _check_fold(train: Sequence[Trajectory], test: Sequence[Trajectory]) -> None:
-    goals = {walk.goal for walk in train}
+    goals = {trajectory.goal for trajectory in train}
     if not test or len(goals) < 2:
         what = "is empty" if not test else f"leaves only goal {goals.pop()!r} to learn from"
         raise ValueError(f"a fold {what}; use fewer folds, or other groups")
-    unknown = {name for walk in test for name in walk.candidates} - {name for walk in train for name in walk.candidates}
+    unknown = {name for trajectory in test for name in trajectory.candidates} - {
+        name for trajectory in train for name in trajectory.candidates
+    }
     if unknown:
         raise ValueError(
             f"goals {sorted(unknown)} are candidates only in the held-out part of a fold; use fewer folds, other "
-            "groups, or judge layouts apart with by='layout'"
+            "groups, or evaluate layouts apart with by='layout'"
         )
 
 
 def nested_training_sets(
-    walks: Sequence[Trajectory],
+    trajectories: Sequence[Trajectory],
     test_share: float,
     rng: np.random.Generator,
     groups: Groups | None = None,
@@ -140,24 +142,24 @@ def nested_training_sets(
     """
     from sklearn.model_selection import GroupShuffleSplit
 
-    goals = np.array(check_learnable(walks))
+    goals = np.array(check_learnable(trajectories))
     if not 0 < test_share < 1:
         raise ValueError(f"`test_share` must be between 0 and 1, got {test_share!r}")
-    order = rng.permutation(len(walks))
+    order = rng.permutation(len(trajectories))
     if groups is None:
-        place = np.empty(len(walks))
+        place = np.empty(len(trajectories))
         for goal in np.unique(goals):
             mine = order[goals[order] == goal]
             place[mine] = (np.arange(len(mine)) + rng.uniform()) / len(mine)
-        count = min(max(round(test_share * len(walks)), 1), len(walks) - 1)
+        count = min(max(round(test_share * len(trajectories)), 1), len(trajectories) - 1)
         order = order[np.argsort(place[order], kind="stable")]
         test, pool = np.sort(order[:count]), order[count:]
     elif groups == "participant":
-        people = [walk.participant for walk in walks]
-        if len(set(people)) < 2:
+        participants = [trajectory.participant for trajectory in trajectories]
+        if len(set(participants)) < 2:
             raise ValueError("grouping by participant needs at least two participants")
         split = GroupShuffleSplit(1, test_size=test_share, random_state=int(rng.integers(2**31)))
-        train, test = next(split.split(np.zeros(len(walks)), groups=people))
+        train, test = next(split.split(np.zeros(len(trajectories)), groups=participants))
         pool = order[np.isin(order, train)]
     else:
         raise ValueError(f"`groups` must be 'participant' or None, got {groups!r}")

@@ -1,1 +1,1 @@
-"""Predictors of walks between stations of a kitchen."""
+"""Predictors for trajectories between the stations of a kitchen."""

@@ -1,4 +1,4 @@
-"""Optimal costs between cells and stations of a kitchen, and the base of the predictors that use them."""
+"""Costs-to-go to the stations of a kitchen, Bayesian goal inference from them, and the base of grid predictors."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import numpy.typing as npt
 
 from legible_envs.overcooked.layout import FLOOR, OvercookedLayout
 from legible_envs.rollouts.trajectory import Trajectory
-from predictors.base import GoalPredictor, GoalStream
+from predictors.base import GoalPredictor, GoalStream, check_trajectories
 
-__all__ = ["GridPredictor", "check_complete", "check_walk", "posterior", "remaining_steps"]
+__all__ = ["GridPredictor", "check_complete", "check_trajectory", "goal_posterior", "remaining_steps"]
 
 GoalCosts = Callable[[OvercookedLayout, tuple[str, ...]], npt.NDArray[np.float64]]
 
@@ -23,14 +23,14 @@ def remaining_steps(layout: OvercookedLayout, goals: tuple[str, ...]) -> npt.NDA
     """Optimal number of steps from every cell into each goal station.
 
     People walk on floor cells and reach into the station with a last step, so that a cell beside a station is one step
-    away from it. A station that has been entered is left for no other: its own cell is 0 from itself.
+    away from it. A station is a dead end: its own cell is 0 from itself and infinitely far from all others.
 
     Args:
         layout: The kitchen.
         goals: ``K`` names of stations.
 
     Returns:
-        ``(H, W, K)`` read-only, ``inf`` where there is no way.
+        ``(H, W, K)`` read-only, ``inf`` where there is no path.
 
     Raises:
         LayoutError: A goal is not a station of this kitchen.
@@ -44,25 +44,27 @@ def remaining_steps(layout: OvercookedLayout, goals: tuple[str, ...]) -> npt.NDA
     return steps
 
 
-def check_walk(walk: Trajectory) -> OvercookedLayout:
-    """The kitchen of a walk whose cells it fits.
+def check_trajectory(trajectory: Trajectory) -> OvercookedLayout:
+    """The kitchen of a trajectory, after checking that the states fit it.
 
     Raises:
-        ValueError: No layout, positions instead of cells, or a cell where nobody can be (named).
+        ValueError: No layout, positions instead of cells, or a state outside the floor (named).
     """
-    layout = walk.layout
+    layout = trajectory.layout
     if layout is None:
         raise ValueError("this predictor needs the layout of a trajectory; this one has none")
     if not isinstance(layout, OvercookedLayout):
-        raise ValueError(f"this predictor reads walks in kitchens; this trajectory has a {type(layout).__name__}")
-    if walk.num_states and (not walk.is_grid or walk.states.shape[1] != 2):
-        raise ValueError(f"expected (row, col) cells, got {walk.states.shape[1]}-d {walk.states.dtype} states")
-    last, floor = walk.num_states - 1, _floor_of(layout)
-    for index, (row, col) in enumerate(walk.states.tolist()):
-        if (row, col) not in floor and (index < last or layout.station_at((row, col)) not in walk.candidates):
+        raise ValueError(f"this predictor is for trajectories in kitchens; this one has a {type(layout).__name__}")
+    if trajectory.num_states and (not trajectory.is_grid or trajectory.states.shape[1] != 2):
+        raise ValueError(
+            f"expected (row, col) cells, got {trajectory.states.shape[1]}-d {trajectory.states.dtype} states"
+        )
+    last, floor = trajectory.num_states - 1, _floor_of(layout)
+    for index, (row, col) in enumerate(trajectory.states.tolist()):
+        if (row, col) not in floor and (index < last or layout.station_at((row, col)) not in trajectory.candidates):
             raise ValueError(
-                f"the walk does not fit the layout: state {index}, row {row}, column {col} is neither floor nor, as "
-                "the last state, a candidate station"
+                f"the trajectory does not fit the layout: state {index}, row {row}, column {col} is neither floor nor, "
+                "as the last state, a candidate station"
             )
     return layout
 
@@ -73,40 +75,42 @@ def _floor_of(layout: OvercookedLayout) -> frozenset[tuple[int, int]]:
     return frozenset((row, col) for row, col in np.argwhere(layout.cells == FLOOR).tolist())
 
 
-def check_complete(walk: Trajectory, number: int) -> OvercookedLayout:
-    """The kitchen of a whole walk: a known goal, no jumps, from a floor cell into the goal station.
+def check_complete(trajectory: Trajectory, number: int) -> OvercookedLayout:
+    """The kitchen of a complete trajectory: a known goal, no jumps, from a floor cell into the goal station.
 
     Args:
-        walk: The walk.
-        number: Its number, for messages.
+        trajectory: The trajectory.
+        number: Its number, for error messages.
 
     Raises:
         ValueError: Anything else (naming the cell).
     """
-    layout = check_walk(walk)
-    if walk.goal is None or not walk.complete:
-        raise ValueError(f"learning needs complete walks with known goals; trajectory {number} is not one")
-    cells = walk.states
-    if len(cells) < 2 or layout.station_at(cells[-1]) != walk.goal:
+    layout = check_trajectory(trajectory)
+    if trajectory.goal is None or not trajectory.complete:
+        raise ValueError(f"learning needs complete trajectories with known goals; trajectory {number} is not one")
+    cells = trajectory.states
+    if len(cells) < 2 or layout.station_at(cells[-1]) != trajectory.goal:
         raise ValueError(
-            f"a complete walk ends with the cell of its goal station after one floor cell or more; trajectory {number} "
-            f"to {walk.goal!r} has the states {cells.tolist()}"
+            f"a complete trajectory ends with the cell of its goal station after one floor cell or more; trajectory "
+            f"{number} to {trajectory.goal!r} has the states {cells.tolist()}"
         )
     jumps = np.flatnonzero(np.abs(np.diff(cells, axis=0)).sum(axis=1) != 1)
     if len(jumps):
         (row, col), (to_row, to_col) = cells[jumps[0]].tolist(), cells[jumps[0] + 1].tolist()
         raise ValueError(
-            f"the walk does not fit the layout: trajectory {number} goes from row {row}, column {col} to row {to_row}, "
+            f"trajectory {number} does not fit its layout: it goes from row {row}, column {col} to row {to_row}, "
             f"column {to_col}, which is not one step"
         )
     return layout
 
 
-def posterior(walk: Trajectory, prior: npt.NDArray[np.float64], goal_costs: GoalCosts) -> npt.NDArray[np.float64]:
-    """Eq. 1: ``P(G) exp(C*(S->G) - C*(Q->G))``, normalised.
+def goal_posterior(
+    trajectory: Trajectory, prior: npt.NDArray[np.float64], goal_costs: GoalCosts
+) -> npt.NDArray[np.float64]:
+    """Bayesian goal inference (Eq. 1): ``P(G) exp(C*(S->G) - C*(Q->G))``, normalised.
 
     Args:
-        walk: What was observed.
+        trajectory: The observed prefix.
         prior: ``(K,)`` probabilities of its candidates.
         goal_costs: Optimal costs in nats, ``(H, W, K)`` for a layout and names of goals.
 
@@ -114,51 +118,49 @@ def posterior(walk: Trajectory, prior: npt.NDArray[np.float64], goal_costs: Goal
         ``(K,)`` probabilities of its candidates; the prior if nothing was observed.
 
     Raises:
-        ValueError: A walk that does not fit its layout, or a candidate that cannot be reached from its first cell.
+        ValueError: A trajectory that does not fit its layout, or a candidate out of reach from its first cell.
     """
-    layout = check_walk(walk)
-    if not walk.num_states:
+    layout = check_trajectory(trajectory)
+    if not trajectory.num_states:
         return prior
-    costs = goal_costs(layout, walk.candidates)
-    (first_row, first_col), (row, col) = walk.states[0].tolist(), walk.states[-1].tolist()
+    costs = goal_costs(layout, trajectory.candidates)
+    (first_row, first_col), (row, col) = trajectory.states[0].tolist(), trajectory.states[-1].tolist()
     optimal = costs[first_row, first_col]
     if np.isinf(optimal).any():
-        goal = walk.candidates[int(np.isinf(optimal).argmax())]
+        goal = trajectory.candidates[int(np.isinf(optimal).argmax())]
         raise ValueError(f"the candidate {goal!r} cannot be reached from row {first_row}, column {first_col}")
     excess = costs[row, col] - optimal
-    possible = np.isfinite(excess)  # nobody inside a station walks on to another
+    possible = np.isfinite(excess)  # no path leads out of a station
     weights = np.zeros(len(prior))
     weights[possible] = prior[possible] * np.exp(excess[possible].min() - excess[possible])
     return weights / weights.sum()
 
 
 class GridStream(GoalStream):
-    """A belief about someone walking on a grid; each cell is checked once, by the predictor."""
+    """The belief about one person on a grid; each cell is checked once, by the predictor."""
 
     def _observed(self) -> Trajectory:
         if not self._points:
             return self._context
-        part = self._context.first(0)
-        part.__dict__.update(states=np.array(self._points), times=np.array(self._times))
-        return part
+        return self._context.observed(np.array(self._points), np.array(self._times))
 
 
 class GridPredictor(GoalPredictor):
-    """A predictor that looks at one walk at a time; subclasses define ``candidate_probabilities``."""
+    """A predictor that takes one trajectory at a time; subclasses define ``candidate_probabilities``."""
 
     @abstractmethod
-    def candidate_probabilities(self, walk: Trajectory) -> npt.NDArray[np.float64]:
-        """``(len(walk.candidates),)`` probabilities in the order of the walk's candidates."""
+    def candidate_probabilities(self, trajectory: Trajectory) -> npt.NDArray[np.float64]:
+        """``(len(trajectory.candidates),)`` probabilities in the order of the candidates."""
 
     def stream(self, context: Trajectory) -> GridStream:
-        """Watch one person as they move; see :meth:`GoalPredictor.stream`."""
+        """Predict one person's goal while they move; see :meth:`GoalPredictor.stream`."""
         return GridStream(self, context)
 
     def predict_proba(self, X: Sequence[Trajectory]) -> npt.NDArray[np.float64]:
         """See :meth:`GoalPredictor.predict_proba`."""
-        walks = self._check_trajectories(X)
-        columns = [self._columns(walk) for walk in walks]
-        probabilities = np.zeros((len(walks), len(self.classes_)))
-        for row, walk in enumerate(walks):
-            probabilities[row, columns[row]] = self.candidate_probabilities(walk)
+        trajectories = check_trajectories(X)
+        columns = [self.candidate_columns(trajectory) for trajectory in trajectories]
+        probabilities = np.zeros((len(trajectories), len(self.classes_)))
+        for row, trajectory in enumerate(trajectories):
+            probabilities[row, columns[row]] = self.candidate_probabilities(trajectory)
         return probabilities

@@ -1,4 +1,7 @@
-"""The goals of the most similar prefixes seen: a baseline that knows nothing about how people walk."""
+"""Baselines for kitchens without a model of motion: nearest neighbours, n-grams and logistic regression of prefixes.
+
+Each learns from all prefixes of complete trajectories, and gives the prior where it has learned nothing.
+"""
 
 from __future__ import annotations
 
@@ -17,12 +20,12 @@ __all__ = ["GridLogistic", "GridNGram", "GridNeighbours"]
 class GridNeighbours(PrefixPredictor):
     """Shares of goals among the ``k`` nearest prefixes.
 
-    Prefixes are compared by the Euclidean distance of their features (see
-    :class:`~predictors.grid.prefixes.PrefixEncoder`). All that are as near as the ``k``-th count, so the answer does
-    not depend on the order of the walks; the prior counts as one more neighbour.
+    Prefixes are compared by the Euclidean distance of the features of
+    :class:`~predictors.grid.prefixes.PrefixEncoder`. All prefixes as near as the ``k``-th count, so the answer does not
+    depend on the order of the trajectories; the prior counts as one more neighbour.
 
     Args:
-        k: Number of neighbours; all prefixes of one walk together count as one.
+        k: Number of neighbours; all prefixes of one trajectory together count as one.
 
     Attributes:
         classes_: ``(K,)`` names of all goals and candidates seen in ``fit``, sorted.
@@ -32,36 +35,34 @@ class GridNeighbours(PrefixPredictor):
         self.k = k
 
     def _check_parameters(self) -> None:
-        if isinstance(self.k, bool) or not isinstance(self.k, int) or self.k < 1:
-            raise ValueError(f"`k` must be an integer >= 1, got {self.k!r}")
+        _check_count("k", self.k)
 
-    def _learn(self, walks: Sequence[Trajectory]) -> None:
-        self._encoder = PrefixEncoder(walks, self.classes_)
-        features, weights = distinct_prefixes(walks, self._encoder, self.classes_)
+    def _learn(self, trajectories: Sequence[Trajectory]) -> None:
+        self._encoder = PrefixEncoder(trajectories, self.classes_)
+        features, weights = distinct_prefixes(trajectories, self._encoder, self.classes_)
         self._columns_first, self._weights = np.ascontiguousarray(features.T), weights
         self._squares = (features**2).sum(axis=1)
         self._sizes = weights.sum(axis=1)
-        self._fallback = self._prior.of(self.classes_.tolist())
 
-    def _read(self, walk: Trajectory, cells: Steps) -> npt.NDArray[np.float64]:
-        query = self._encoder.encode(walk, cells)
-        there = np.flatnonzero(query)  # a dozen features of hundreds
-        found = votes_of_nearest(
+    def _weigh(self, trajectory: Trajectory, cells: Steps) -> npt.NDArray[np.float64]:
+        query = self._encoder.encode(trajectory, cells)
+        there = np.flatnonzero(query)  # a dozen of hundreds of features
+        votes = votes_of_nearest(
             there, query[there], self._columns_first, self._squares, self._weights, self._sizes, float(self.k)
         )
-        return found + self._fallback
+        return votes + self._prior_weights
 
 
 class GridNGram(PrefixPredictor):
-    """Shares of goals among walks with the same last ``n`` steps, smoothed by those with fewer steps the same.
+    """Shares of goals among trajectories with the same last ``n`` steps, smoothed by those with fewer steps the same.
 
-    The start station comes before the first cell. The shares after ``m`` common steps are those of the walks counted,
-    plus ``strength`` walks distributed as after ``m - 1``; after none, the prior (Dirichlet smoothing; MacKay and Peto,
-    *A hierarchical Dirichlet language model*, 1995).
+    The start station comes before the first cell. The shares after ``m`` common steps are those of the trajectories
+    counted, plus ``strength`` trajectories distributed as after ``m - 1``; after none, the prior (Dirichlet smoothing;
+    MacKay and Peto, *A hierarchical Dirichlet language model*, 1995).
 
     Args:
         n: Steps of the longest context.
-        strength: Weight of the shorter context, in walks.
+        strength: Weight of the shorter context, in trajectories.
 
     Attributes:
         classes_: ``(K,)`` names of all goals and candidates seen in ``fit``, sorted.
@@ -72,36 +73,33 @@ class GridNGram(PrefixPredictor):
         self.strength = strength
 
     def _check_parameters(self) -> None:
-        if isinstance(self.n, bool) or not isinstance(self.n, int) or self.n < 1:
-            raise ValueError(f"`n` must be an integer >= 1, got {self.n!r}")
-        if not isinstance(self.strength, int | float) or not 0 < self.strength < np.inf:
-            raise ValueError(f"`strength` must be a finite number above 0, got {self.strength!r}")
+        _check_count("n", self.n)
+        _check_positive("strength", self.strength)
 
-    def _contexts(self, walk: Trajectory, cells: Steps) -> Iterator[tuple[object, ...]]:
+    def _contexts(self, trajectory: Trajectory, cells: Steps) -> Iterator[tuple[object, ...]]:
         """The last 1, 2, … n steps."""
-        steps = (walk.start, *cells)
-        place = self._places.get(walk.layout, -1)
+        steps = (trajectory.start, *cells)
+        place = self._places.get(trajectory.layout, -1)
         for count in range(1, min(self.n, len(steps)) + 1):
             yield (place, *steps[-count:])
 
-    def _learn(self, walks: Sequence[Trajectory]) -> None:
+    def _learn(self, trajectories: Sequence[Trajectory]) -> None:
         column = {name: number for number, name in enumerate(self.classes_.tolist())}
         self._counts: dict[tuple[object, ...], npt.NDArray[np.float64]] = {}
-        layouts = dict.fromkeys(walk.layout for walk in walks)
+        layouts = dict.fromkeys(trajectory.layout for trajectory in trajectories)
         self._places = {layout: number for number, layout in enumerate(layouts)}
-        for walk in walks:
-            cells: Steps = tuple(map(tuple, walk.states[:-1].tolist()))
+        for trajectory in trajectories:
+            cells: Steps = tuple(map(tuple, trajectory.states[:-1].tolist()))
             for end in range(1, len(cells) + 1):
-                for context in self._contexts(walk, cells[:end]):
+                for context in self._contexts(trajectory, cells[:end]):
                     counts = self._counts.setdefault(context, np.zeros(len(column)))
-                    counts[column[walk.goal or ""]] += 1.0
-        self._fallback = self._prior.of(self.classes_.tolist())
+                    counts[column[trajectory.goal or ""]] += 1.0
 
-    def _read(self, walk: Trajectory, cells: Steps) -> npt.NDArray[np.float64]:
-        shares = self._fallback
-        for context in self._contexts(walk, cells):
+    def _weigh(self, trajectory: Trajectory, cells: Steps) -> npt.NDArray[np.float64]:
+        shares = self._prior_weights
+        for context in self._contexts(trajectory, cells):
             counts = self._counts.get(context)
-            if counts is None:  # longer ones were not seen either
+            if counts is None:  # then longer contexts were not seen either
                 break
             shares = (counts + self.strength * shares) / (counts.sum() + self.strength)
         return shares
@@ -110,8 +108,9 @@ class GridNGram(PrefixPredictor):
 class GridLogistic(PrefixPredictor):
     """Logistic regression from a prefix to the goal.
 
-    Features are those of :class:`~predictors.grid.prefixes.PrefixEncoder`; every prefix of every walk is an example,
-    those of one walk weigh 1 together. Answers are shrunk toward the prior as if each goal had been seen once more.
+    Features are those of :class:`~predictors.grid.prefixes.PrefixEncoder`; every prefix of every trajectory is an
+    example, and those of one trajectory weigh 1 together. Probabilities are shrunk toward the prior as if each goal had
+    been seen once more.
 
     Args:
         C: Inverse strength of the L2 penalty.
@@ -131,23 +130,20 @@ class GridLogistic(PrefixPredictor):
         self.max_iter = max_iter
 
     def _check_parameters(self) -> None:
-        for name in ("C", "max_iter"):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < np.inf:
-                raise ValueError(f"`{name}` must be a finite number above 0, got {value!r}")
+        _check_positive("C", self.C)
+        _check_positive("max_iter", self.max_iter)
 
-    def _learn(self, walks: Sequence[Trajectory]) -> None:
+    def _learn(self, trajectories: Sequence[Trajectory]) -> None:
         from sklearn.linear_model import LogisticRegression
 
-        self._encoder = PrefixEncoder(walks, self.classes_)
-        features, weights = distinct_prefixes(walks, self._encoder, self.classes_)
+        self._encoder = PrefixEncoder(trajectories, self.classes_)
+        features, weights = distinct_prefixes(trajectories, self._encoder, self.classes_)
         count = len(self.classes_)
         self.coef_ = np.zeros((count, self._encoder.width))
         self.intercept_ = np.full(count, -np.inf)
         rows, goals = np.nonzero(weights)
         seen = np.unique(goals)
-        self._trust = len(walks) / (len(walks) + count)
-        self._fallback = self._prior.of(self.classes_.tolist())
+        self._trust = len(trajectories) / (len(trajectories) + count)
         if len(seen) == 1:
             self.intercept_[seen] = 0.0
             return
@@ -158,7 +154,17 @@ class GridLogistic(PrefixPredictor):
             coef, intercept = np.vstack([-coef, coef]) / 2, np.concatenate([-intercept, intercept]) / 2
         self.coef_[seen], self.intercept_[seen] = coef, intercept
 
-    def _read(self, walk: Trajectory, cells: Steps) -> npt.NDArray[np.float64]:
-        scores = self.coef_ @ self._encoder.encode(walk, cells) + self.intercept_
+    def _weigh(self, trajectory: Trajectory, cells: Steps) -> npt.NDArray[np.float64]:
+        scores = self.coef_ @ self._encoder.encode(trajectory, cells) + self.intercept_
         weights = np.exp(scores - scores.max())
-        return self._trust * weights / weights.sum() + (1 - self._trust) * self._fallback
+        return self._trust * weights / weights.sum() + (1 - self._trust) * self._prior_weights
+
+
+def _check_count(name: str, value: int) -> None:
+    if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+        raise ValueError(f"`{name}` must be an integer >= 1, got {value!r}")
+
+
+def _check_positive(name: str, value: float) -> None:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < np.inf:
+        raise ValueError(f"`{name}` must be a finite number above 0, got {value!r}")

@@ -1,4 +1,4 @@
-"""Eq. 1 of Tung et al. (HRI 2024): goals explain the way so far as nearly optimal, or do not."""
+"""Bayesian goal inference (Eq. 1 of Tung et al., HRI 2024): for which goals is the path so far nearly optimal?"""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from sklearn.base import clone
 
 from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.rollouts.trajectory import Trajectory
-from predictors.grid.base import GridPredictor, check_complete, posterior, remaining_steps
-from predictors.grid.graphs import optimal_costs, soft_costs, walk_graph
+from predictors.grid.base import GridPredictor, check_complete, goal_posterior, remaining_steps
+from predictors.grid.graphs import soft_costs, station_costs, walk_graph
 from predictors.grid.maxent_irl import MaxEntIRL
 from predictors.grid.priors import GoalPrior, Prior
 from predictors.grid.walk_likelihood import best_uniform_cost, collect_evidence
@@ -30,19 +30,19 @@ class BayesianGoalPredictor(GridPredictor):
 
     ``P(G | S->Q) ∝ P(G) exp(-beta (C(S->Q) + C*(Q->G) - C*(S->G)))`` (Eq. 1 of Tung et al., HRI 2024, after Dragan and
     Srinivasa, 2013). The cost so far, ``C(S->Q)``, is the same for every goal and cancels: the belief depends on where
-    the person began and where he is now. ``S`` is the first floor cell of the walk. With nothing or one cell observed
-    the belief is the prior.
+    the person began and where they are now. ``S`` is the first floor cell of the trajectory. With nothing or one cell
+    observed the belief is the prior.
 
-    ``C*`` is the cost of the cheapest way (``costs="hard"``), or that of all ways together, ``-log(Z) / beta`` with
-    ``Z`` the sum of ``exp(-beta C)`` over all walks (``costs="soft"``); with the latter Eq. 1 is the exact posterior of
-    people who take each walk with probability proportional to ``exp(-beta C)``.
+    ``C*`` is the cost of the cheapest path (``costs="hard"``), or the soft minimum over all paths, ``-log(Z) / beta``
+    with ``Z`` the sum of ``exp(-beta C)`` over all paths of every length (``costs="soft"``). With soft costs Eq. 1 is
+    the exact posterior of people who take each path with probability proportional to ``exp(-beta C)``.
 
     Args:
-        beta: Rationality, per unit of cost: 0 learns nothing from the way, larger values judge detours more sharply.
+        beta: Rationality, per unit of cost: 0 learns nothing from the path, larger values penalise detours more.
             With hard costs and a uniform prior, which goal is on top does not depend on it. ``"fit"``: the value that
-            makes the walks of ``fit`` most likely (uniform costs only). None: 1; but with soft uniform costs, in
-            kitchens so open that the sum over walks diverges at 1, .25 more than where it begins to be finite.
-        costs: ``"hard"`` or ``"soft"``. Soft costs need a ``beta`` at which the sum over walks is finite: at uniform
+            makes the trajectories of ``fit`` most likely (uniform costs only). None: 1; but with soft uniform costs,
+            in kitchens so open that the sum over paths diverges at 1, .25 more than where it begins to be finite.
+        costs: ``"hard"`` or ``"soft"``. Soft costs need a ``beta`` at which the sum over paths is finite: at uniform
             costs above 1.25 in a room of 5 x 5 cells, 1.39 suffices anywhere.
         cell_costs: What entering a cell costs: ``"uniform"``: 1. ``"learned"``: what :class:`MaxEntIRL` learns in
             ``fit``. A ``MaxEntIRL`` with other settings, which is cloned and fitted. Or the ``(H, W)`` costs
@@ -58,8 +58,9 @@ class BayesianGoalPredictor(GridPredictor):
         >>> from legible_envs.overcooked import OvercookedLayout
         >>> from legible_envs.rollouts import Trajectory
         >>> kitchen = OvercookedLayout.from_ascii("XOXXXTX\nX     X\nXXXSXXX")
-        >>> walk = Trajectory([(1, 3), (1, 2)], goal="onion", candidates=("onion", "tomato"), layout=kitchen)
-        >>> BayesianGoalPredictor().fit([walk]).predict_proba([walk.first(1), walk]).round(3).tolist()
+        >>> trajectory = Trajectory([(1, 3), (1, 2)], goal="onion", candidates=("onion", "tomato"), layout=kitchen)
+        >>> predictor = BayesianGoalPredictor().fit([trajectory])
+        >>> predictor.predict_proba([trajectory.first(1), trajectory]).round(3).tolist()
         [[0.5, 0.5], [0.881, 0.119]]
     """
 
@@ -83,24 +84,24 @@ class BayesianGoalPredictor(GridPredictor):
         """Learn the names of the goals, and what the parameters leave to learning; see :meth:`GoalPredictor.fit`.
 
         Raises:
-            ValueError: Bad parameters, no walks, or, where something is learned from them, incomplete walks.
+            ValueError: Bad parameters, no trajectories, or incomplete ones where costs or ``beta`` are learned.
         """
         self._check_parameters()
         super().fit(X, y)
-        walks = list(X)
-        self._prior = GoalPrior(self.prior, walks, self.classes_)
+        trajectories = list(X)
+        self._prior = GoalPrior(self.prior, trajectories, self.classes_)
         self._tables: dict[tuple[OvercookedLayout, tuple[str, ...]], npt.NDArray[np.float64]] = {}
         if self.beta == "fit":
-            for number, walk in enumerate(walks):
-                check_complete(walk, number)
-            self.beta_ = best_uniform_cost(collect_evidence(walks))
+            for number, trajectory in enumerate(trajectories):
+                check_complete(trajectory, number)
+            self.beta_ = best_uniform_cost(collect_evidence(trajectories))
         else:
             self.beta_ = 1.0 if self.beta is None else float(self.beta)
         self.__dict__.pop("irl_", None)
         if isinstance(self.cell_costs, MaxEntIRL):
-            self.irl_ = clone(self.cell_costs).fit(walks)
+            self.irl_ = clone(self.cell_costs).fit(trajectories)
         elif isinstance(self.cell_costs, str) and self.cell_costs == "learned":
-            self.irl_ = MaxEntIRL().fit(walks)
+            self.irl_ = MaxEntIRL().fit(trajectories)
         return self
 
     def _check_parameters(self) -> None:
@@ -124,7 +125,7 @@ class BayesianGoalPredictor(GridPredictor):
 
         Raises:
             LayoutError: A goal is not a station of this kitchen.
-            ValueError: Soft costs where the sum over walks diverges, or cell costs of another shape.
+            ValueError: Soft costs where the sum over paths diverges, or cell costs of another shape.
         """
         table = self._tables.get((layout, goals))
         if table is None:
@@ -135,7 +136,7 @@ class BayesianGoalPredictor(GridPredictor):
 
     def _make_table(self, layout: OvercookedLayout, goals: tuple[str, ...]) -> npt.NDArray[np.float64]:
         uniform = isinstance(self.cell_costs, str) and self.cell_costs == "uniform"
-        if self.beta_ == 0:  # where there is no way it stays infinitely far
+        if self.beta_ == 0:  # without a path a goal stays infinitely far
             return np.where(np.isinf(remaining_steps(layout, goals)), np.inf, 0.0)
         if self.costs == "hard" and uniform:
             return self.beta_ * remaining_steps(layout, goals)
@@ -144,7 +145,7 @@ class BayesianGoalPredictor(GridPredictor):
         else:
             costs = self.irl_.cost_map(layout) if hasattr(self, "irl_") else np.asarray(self.cell_costs, np.float64)
         if self.costs == "hard":
-            return self.beta_ * optimal_costs(layout, goals, costs)
+            return self.beta_ * station_costs(layout, goals, costs)
         beta = self.beta_
         if uniform and self.beta is None:
             beta = max(beta, walk_graph(layout, goals).divergence_cost + _MARGIN)
@@ -153,16 +154,16 @@ class BayesianGoalPredictor(GridPredictor):
         except ValueError as error:
             raise ValueError(f"{error}; raise `beta` ({self.beta_:.4g}) or give beta='fit'") from error
 
-    def candidate_probabilities(self, walk: Trajectory) -> npt.NDArray[np.float64]:
-        """``(len(walk.candidates),)`` probabilities in the order of the walk's candidates.
+    def candidate_probabilities(self, trajectory: Trajectory) -> npt.NDArray[np.float64]:
+        """``(len(trajectory.candidates),)`` probabilities in the order of the candidates.
 
         Raises:
-            ValueError: A walk that does not fit its layout, or a candidate that cannot be reached from its start.
+            ValueError: A trajectory that does not fit its layout, or a candidate that cannot be reached from its start.
         """
-        return posterior(walk, self._prior.of(walk.candidates), self.goal_costs)
+        return goal_posterior(trajectory, self._prior.of(trajectory.candidates), self.goal_costs)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without the tables, which are made again when asked for."""
+        """Without the tables, which are computed again on demand."""
         state = dict(super().__getstate__())
         if "_tables" in state:
             state["_tables"] = {}

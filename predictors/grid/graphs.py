@@ -1,4 +1,4 @@
-"""A kitchen's floor as the arrays that kernels work on, and costs of the ways into its stations."""
+"""A kitchen's floor as the arrays that kernels work on, and the costs of paths into its stations."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy.typing as npt
 from legible_envs.overcooked.layout import OvercookedLayout
 from predictors.grid.walk_kernels import cheapest_costs, walk_costs
 
-__all__ = ["WalkGraph", "optimal_costs", "soft_costs", "walk_graph"]
+__all__ = ["WalkGraph", "soft_costs", "station_costs", "walk_graph"]
 
 _MOVES = ((-1, 0), (1, 0), (0, -1), (0, 1))
 
@@ -40,7 +40,7 @@ class WalkGraph:
 
     @cached_property
     def divergence_cost(self) -> float:
-        """Uniform cost per step at and below which the sum over all walks diverges: log of the spectral radius."""
+        """Uniform cost per step at and below which the sum over all paths diverges: log of the spectral radius."""
         if not len(self.cells):
             return -np.inf
         adjacency = np.zeros((len(self.cells), len(self.cells)))
@@ -71,19 +71,19 @@ def walk_graph(layout: OvercookedLayout, goals: tuple[str, ...]) -> WalkGraph:
     return WalkGraph(layout, goals, cells, index, neighbours, access, int(away.max(initial=0)))
 
 
-def optimal_costs(
+def station_costs(
     layout: OvercookedLayout, goals: tuple[str, ...], cell_costs: npt.NDArray[np.float64]
 ) -> npt.NDArray[np.float64]:
-    """Cost of the cheapest walk from every cell into each station.
+    """Cost-to-go of the cheapest path from every cell into each station.
 
     Args:
         layout: The kitchen.
         goals: ``K`` names of stations.
         cell_costs: ``(H, W)`` of entering each cell; entering the station is free. Negative ones are allowed where no
-            round trip pays.
+            cycle has a negative cost.
 
     Returns:
-        ``(H, W, K)``, ``inf`` where there is no way. A station's own cell is 0 from itself.
+        ``(H, W, K)``, ``inf`` where there is no path. A station's own cell is 0 from itself.
     """
     graph = walk_graph(layout, goals)
     return _on_grid(graph, cheapest_costs(_of_cells(graph, cell_costs), graph.neighbours, graph.access))
@@ -92,7 +92,7 @@ def optimal_costs(
 def soft_costs(
     layout: OvercookedLayout, goals: tuple[str, ...], cell_costs: npt.NDArray[np.float64]
 ) -> npt.NDArray[np.float64]:
-    """``-log Z``: the cost of all walks from every cell into each station, the cheap ones counting most.
+    """``-log Z``: the soft minimum of the costs of all paths from every cell into each station.
 
     Args:
         layout: The kitchen.
@@ -100,18 +100,18 @@ def soft_costs(
         cell_costs: ``(H, W)`` of entering each cell; entering the station is free.
 
     Returns:
-        ``(H, W, K)``, ``inf`` where there is no way. A station's own cell is 0 from itself.
+        ``(H, W, K)``, ``inf`` where there is no path. A station's own cell is 0 from itself.
 
     Raises:
-        ValueError: The sum over walks diverges: walking about costs too little.
+        ValueError: The sum over all paths diverges, as steps cost too little.
     """
     graph = walk_graph(layout, goals)
     costs = _of_cells(graph, cell_costs)
     values, finite = walk_costs(costs, graph.neighbours, graph.band, graph.access)
     if not finite:
         raise ValueError(
-            f"the sum over all walks diverges in this kitchen at costs of {costs.min():.4g} to {costs.max():.4g} per "
-            f"step: walking about costs too little; uniform costs must be above {graph.divergence_cost:.4g}"
+            f"the sum over all paths diverges in this kitchen at costs of {costs.min():.4g} to {costs.max():.4g} per "
+            f"step: steps cost too little; uniform costs must be above {graph.divergence_cost:.4g}"
         )
     return _on_grid(graph, values)
 

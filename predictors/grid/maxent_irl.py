@@ -1,4 +1,4 @@
-"""Maximum-entropy inverse reinforcement learning of what each cell of a kitchen costs people, exactly."""
+"""Exact maximum-entropy inverse reinforcement learning of the costs of cells in kitchens."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import numpy.typing as npt
 
 from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.rollouts.trajectory import Trajectory
-from predictors.grid.base import GridPredictor, check_complete, posterior
+from predictors.base import check_trajectories
+from predictors.grid.base import GridPredictor, check_complete, goal_posterior
 from predictors.grid.graphs import soft_costs
 from predictors.grid.priors import GoalPrior, Prior
 from predictors.grid.walk_likelihood import (
@@ -31,18 +32,18 @@ Features = Literal["position"] | npt.NDArray[np.float64] | FeatureMap
 
 
 class MaxEntIRL(GridPredictor):
-    r"""Learns what each cell costs people from how they walk, and predicts goals with it.
+    r"""Learns the costs of cells from trajectories, and predicts goals with them.
 
     The model (Ziebart et al., *Maximum entropy inverse reinforcement learning*, AAAI 2008, with goal stations that
-    absorb): of all walks from ``S`` into ``G``, a walk is taken with probability ``exp(-cost) / Z[S, G]``, its cost the
-    sum over the cells it enters. ``Z = (I - W)^-1 B`` sums over *all* walks, of every length, so the likelihood and
+    absorb): of all paths from ``S`` into ``G``, a path is taken with probability ``exp(-cost) / Z[S, G]``, its cost the
+    sum over the cells it enters. ``Z = (I - W)^-1 B`` sums over *all* paths, of every length, so the likelihood and
     its gradient are exact, and the fit is convex. It is defined while the sum is finite, that is while the spectral
     radius of ``W`` is below 1: loitering must cost something.
 
     Costs are ``u + features @ coef``, the weights found by maximum likelihood with the penalty ``l2 / 2 |coef|^2``.
-    With a weight per position ``u`` is the best uniform cost per step for all walks together, and what kitchens without
-    walks get; with other features it is found along with them. The penalty is needed: costs raised on the black and
-    lowered on the white cells of a checkerboard describe (almost) the same people.
+    With a weight per position ``u`` is the best uniform cost per step for all trajectories together, and the cost in
+    kitchens without any; with other features it is found along with their weights. The penalty is needed: costs raised
+    on the black and lowered on the white cells of a checkerboard give (almost) the same likelihood.
 
     The belief is ``P(G | S->Q) ∝ P(G) Z[Q, G] / Z[S, G]``, the exact posterior of this model; it is what
     ``BayesianGoalPredictor(costs="soft", cell_costs="learned")`` computes.
@@ -51,22 +52,22 @@ class MaxEntIRL(GridPredictor):
         features: ``"position"``: a weight for each cell of each kitchen. Or ``(H*W, k)`` features of the cells in
             reading order, for kitchens of that shape, or a function that returns them for a layout; the ``k`` weights
             are shared by all kitchens.
-        l2: Strength of the pull toward the uniform cost, above 0. On some hundred recorded walks per kitchen less pull
-            (1) makes unseen walks a little more likely, by .01 to .03 nats each; goals are then read better in some
-            kitchens and worse in others.
+        l2: Strength of the pull toward the uniform cost, above 0. On some hundred recorded trajectories per kitchen
+            less pull (1) makes unseen trajectories a little more likely, by .01 to .03 nats each; goals are then
+            predicted better in some kitchens and worse in others.
         prior: ``"uniform"`` over candidates, or ``"empirical"``: as often as each was chosen in ``fit``.
         max_iter: Most iterations of L-BFGS.
-        tol: Largest component of the gradient, per walk, at which the fit is done.
+        tol: Largest component of the gradient, per trajectory, at which the fit is done.
 
     Attributes:
         classes_: ``(K,)`` names of all goals and candidates seen in ``fit``, sorted.
-        uniform_cost_: Best uniform cost per step, the rationality of the people in nats per step.
-        costs_: Learned cost of entering each cell, ``{layout: (H, W)}``, NaN where nobody can stand.
+        uniform_cost_: Best uniform cost per step, the participants' rationality in nats per step.
+        costs_: Learned cost of entering each cell, ``{layout: (H, W)}``, NaN off the floor.
         cost_: That of the only kitchen; absent where there are several.
         reward_: ``-cost_``.
         intercept_: The level ``u``.
         coef_: Learned weights: ``(k,)``, or ``{layout: (n,)}`` of the cells in reach for ``"position"``.
-        log_likelihood_: Of the walks learned from, in nats per walk, given start and goal of each.
+        log_likelihood_: Of the trajectories in ``fit``, in nats per trajectory, given start and goal of each.
         n_iter_: Iterations used.
         converged_: Whether they sufficed.
 
@@ -74,12 +75,12 @@ class MaxEntIRL(GridPredictor):
         >>> from legible_envs.overcooked import OvercookedLayout
         >>> from legible_envs.rollouts import Trajectory
         >>> kitchen = OvercookedLayout.from_ascii("XOXXXTX\nX     X\nXXXSXXX")
-        >>> walk = Trajectory([(1, 3), (1, 2), (1, 1), (0, 1)], goal="onion", candidates=("onion", "tomato"),
-        ...                   layout=kitchen)
-        >>> irl = MaxEntIRL().fit([walk] * 20)
+        >>> cells = [(1, 3), (1, 2), (1, 1), (0, 1)]
+        >>> trajectory = Trajectory(cells, goal="onion", candidates=("onion", "tomato"), layout=kitchen)
+        >>> irl = MaxEntIRL().fit([trajectory] * 20)
         >>> irl.cost_.shape, irl.converged_
         ((3, 7), True)
-        >>> bool(irl.predict_proba([walk.first(2)])[0, 0] > 0.9)
+        >>> bool(irl.predict_proba([trajectory.first(2)])[0, 0] > 0.9)
         True
     """
 
@@ -112,22 +113,23 @@ class MaxEntIRL(GridPredictor):
     # -- learning -----------------------------------------------------------------------------------------------------
 
     def fit(self, X: Sequence[Trajectory], y: object = None) -> Self:
-        """Learn costs from complete walks.
+        """Learn costs from complete trajectories.
 
         Args:
-            X: Complete walks with known goals.
+            X: Complete trajectories with known goals.
             y: Ignored; goals are part of the trajectories.
 
         Raises:
-            ValueError: No walks, prefixes, walks that do not fit their layout (naming the cell), or bad parameters.
+            ValueError: No trajectories, prefixes, trajectories that do not fit their layout (naming the cell), or bad
+                parameters.
         """
         self._check_parameters()
         super().fit(X, y)
-        walks = list(X)
-        for number, walk in enumerate(walks):
-            check_complete(walk, number)
-        self._prior = GoalPrior(self.prior, walks, self.classes_)
-        evidence = collect_evidence(walks)
+        trajectories = list(X)
+        for number, trajectory in enumerate(trajectories):
+            check_complete(trajectory, number)
+        self._prior = GoalPrior(self.prior, trajectories, self.classes_)
+        evidence = collect_evidence(trajectories)
         self.uniform_cost_ = best_uniform_cost(evidence)
         self.costs_, self._tables, value = {}, {}, 0.0
         self.n_iter_, self.converged_ = 0, True
@@ -138,7 +140,7 @@ class MaxEntIRL(GridPredictor):
                 value += loss
         else:
             self.coef_, value = self._learn(evidence, self._feature_map())
-        self.log_likelihood_ = -value / len(walks)
+        self.log_likelihood_ = -value / len(trajectories)
         for name in ("cost_", "reward_"):
             self.__dict__.pop(name, None)
         if len(self.costs_) == 1:
@@ -152,7 +154,7 @@ class MaxEntIRL(GridPredictor):
         self.n_iter_ = max(self.n_iter_, found.iterations)
         self.converged_ = self.converged_ and found.converged
         self.intercept_ = found.level
-        for layout, costs in found.costs.items():  # rooms without walks are left out there
+        for layout, costs in found.costs.items():  # rooms without trajectories are left out there
             merged = np.where(np.isnan(costs), self._expected_costs(layout, found.weights), costs)
             merged.flags.writeable = False
             self.costs_[layout] = merged
@@ -175,14 +177,14 @@ class MaxEntIRL(GridPredictor):
     # -- predicting ---------------------------------------------------------------------------------------------------
 
     def cost_map(self, layout: OvercookedLayout) -> Floats:
-        """``(H, W)`` cost of entering each cell of a kitchen, also of one never seen.
+        """``(H, W)`` cost of entering each cell of a kitchen, also of one that ``fit`` did not see.
 
-        NaN where nobody can stand. A kitchen never seen has the uniform cost, or that of its features.
+        NaN off the floor. A kitchen that ``fit`` did not see has the uniform cost, or that of its features.
         """
         return self.costs_[layout] if layout in self.costs_ else self._expected_costs(layout, self.coef_)
 
     def _expected_costs(self, layout: OvercookedLayout, weights: Any) -> Floats:
-        """``(H, W)`` costs where there were no walks."""
+        """``(H, W)`` costs where there were no trajectories."""
         costs = np.where(layout.cells == 0, self.intercept_, np.nan)
         if not isinstance(self.features, str):
             costs += (np.asarray(self._feature_map()(layout)) @ weights).reshape(layout.shape)
@@ -193,7 +195,7 @@ class MaxEntIRL(GridPredictor):
 
         Raises:
             LayoutError: A goal is not a station of this kitchen.
-            ValueError: A kitchen never seen, in which the sum over walks diverges at the costs learned.
+            ValueError: A kitchen that ``fit`` did not see, in which the sum over paths diverges at the learned costs.
         """
         table = self._tables.get((layout, goals))
         if table is None:
@@ -202,27 +204,27 @@ class MaxEntIRL(GridPredictor):
             table = self._tables[layout, goals] = soft_costs(layout, goals, self.cost_map(layout))
         return table
 
-    def candidate_probabilities(self, walk: Trajectory) -> Floats:
-        """``(len(walk.candidates),)`` probabilities in the order of the walk's candidates.
+    def candidate_probabilities(self, trajectory: Trajectory) -> Floats:
+        """``(len(trajectory.candidates),)`` probabilities in the order of the candidates.
 
         Raises:
-            ValueError: A walk that does not fit its layout, or a candidate that cannot be reached from its start.
+            ValueError: A trajectory that does not fit its layout, or a candidate that cannot be reached from its start.
         """
-        return posterior(walk, self._prior.of(walk.candidates), self.goal_costs)
+        return goal_posterior(trajectory, self._prior.of(trajectory.candidates), self.goal_costs)
 
     def log_likelihoods(self, X: Sequence[Trajectory]) -> Floats:
-        """``(n,)`` log-probability of each complete walk given its start and goal, in nats.
+        """``(n,)`` log-probability of each complete trajectory given its start and goal, in nats.
 
         Raises:
-            ValueError: Prefixes, or walks that do not fit their layout.
+            ValueError: Prefixes, or trajectories that do not fit their layout.
         """
-        walks = self._check_trajectories(X)
-        result = np.empty(len(walks))
-        for number, walk in enumerate(walks):
-            layout = check_complete(walk, number)
-            self._columns(walk)
-            goal = walk.goal or ""
-            cells = walk.states[:-1]
+        trajectories = check_trajectories(X)
+        result = np.empty(len(trajectories))
+        for number, trajectory in enumerate(trajectories):
+            layout = check_complete(trajectory, number)
+            self.candidate_columns(trajectory)
+            goal = trajectory.goal or ""
+            cells = trajectory.states[:-1]
             table = self.goal_costs(layout, (goal,))
             result[number] = table[(*cells[0], 0)] - self.cost_map(layout)[cells[1:, 0], cells[1:, 1]].sum()
         return result
@@ -248,7 +250,7 @@ class MaxEntIRL(GridPredictor):
 
         if layout is None:
             if len(self.costs_) != 1:
-                raise ValueError(f"say which of the {len(self.costs_)} kitchens to draw")
+                raise ValueError(f"give `layout`, one of the {len(self.costs_)} kitchens in `costs_`")
             (layout,) = self.costs_
         reward = -self.cost_map(layout)
         low, high = float(np.nanmin(reward)), float(np.nanmax(reward))
@@ -257,7 +259,7 @@ class MaxEntIRL(GridPredictor):
         return draw_ambiguity(layout, np.clip(heat, 0, 1), tile=tile, values=values, legend=legend, title=title)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without the tables, which are made again when asked for."""
+        """Without the tables, which are computed again on demand."""
         state = dict(super().__getstate__())
         if "_tables" in state:
             state["_tables"] = {}

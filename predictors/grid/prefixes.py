@@ -1,4 +1,4 @@
-"""Prefixes of walks as numbers, and the base of the predictors that learn from them without a model of people."""
+"""Prefixes of trajectories as feature vectors, and the base of the baselines that learn from them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.rollouts.trajectory import Trajectory
-from predictors.grid.base import GridPredictor, check_complete, check_walk, remaining_steps
+from predictors.grid.base import GridPredictor, check_complete, check_trajectory, remaining_steps
 from predictors.grid.priors import GoalPrior
 
 __all__ = ["PrefixEncoder", "PrefixPredictor", "distinct_prefixes"]
@@ -28,26 +28,26 @@ class PrefixEncoder:
     goal how much nearer it has come per step taken (1: straight toward it, -1: straight away).
 
     Args:
-        walks: Complete walks whose stations and cells the one-hot features are for; others are zero.
+        trajectories: Complete trajectories; their stations and cells define the one-hot features, others are zero.
         classes: ``(K,)`` names of goals.
     """
 
-    def __init__(self, walks: Sequence[Trajectory], classes: npt.NDArray[np.str_]) -> None:
+    def __init__(self, trajectories: Sequence[Trajectory], classes: npt.NDArray[np.str_]) -> None:
         self._classes = tuple(classes.tolist())
         self._places: dict[OvercookedLayout, int] = {}
         self._index: dict[tuple[object, ...], int] = {}
-        for walk in walks:
-            place = self._places.setdefault(_layout_of(walk), len(self._places))
-            cells = tuple(map(tuple, walk.states[:-1].tolist()))
+        for trajectory in trajectories:
+            place = self._places.setdefault(_layout_of(trajectory), len(self._places))
+            cells = tuple(map(tuple, trajectory.states[:-1].tolist()))
             for end in range(1, len(cells) + 1):
-                for key, _ in _one_hot(place, walk.start, cells[:end]):
+                for key, _ in _one_hot(place, trajectory.start, cells[:end]):
                     self._index.setdefault(key, len(self._index))
         self.width = len(self._index) + 1 + len(self._classes)
 
-    def encode(self, walk: Trajectory, cells: Steps) -> Floats:
-        """``(width,)`` features of the first cells of a walk, at least one."""
-        layout, row = _layout_of(walk), np.zeros(self.width)
-        for key, value in _one_hot(self._places.get(layout, -1), walk.start, cells):
+    def encode(self, trajectory: Trajectory, cells: Steps) -> Floats:
+        """``(width,)`` features of the first cells of a trajectory, at least one."""
+        layout, row = _layout_of(trajectory), np.zeros(self.width)
+        for key, value in _one_hot(self._places.get(layout, -1), trajectory.start, cells):
             column = self._index.get(key)
             if column is not None:
                 row[column] += value
@@ -61,13 +61,13 @@ class PrefixEncoder:
         return row
 
 
-def _layout_of(walk: Trajectory) -> OvercookedLayout:
-    assert isinstance(walk.layout, OvercookedLayout)
-    return walk.layout
+def _layout_of(trajectory: Trajectory) -> OvercookedLayout:
+    assert isinstance(trajectory.layout, OvercookedLayout)
+    return trajectory.layout
 
 
 def _one_hot(place: int, start: str, cells: Steps) -> list[tuple[tuple[object, ...], float]]:
-    """What is the case, and how much; ``place`` numbers the kitchen."""
+    """Names and values of the features that are not zero; ``place`` is the number of the kitchen."""
     values: list[tuple[tuple[object, ...], float]] = [
         (("start", place, start), 1.0),
         (("first", place, cells[0]), 1.0),
@@ -81,89 +81,95 @@ def _one_hot(place: int, start: str, cells: Steps) -> list[tuple[tuple[object, .
 
 
 class PrefixPredictor(GridPredictor):
-    """Learns from all prefixes of complete walks; subclasses define ``_learn`` and ``_read``.
+    """Learns from all prefixes of complete trajectories; subclasses define ``_learn`` and ``_weigh``.
 
-    Nothing observed: the prior, as often as each goal was chosen. Someone inside a candidate station has reached it.
+    With nothing observed the belief is the prior: as often as each goal was chosen. A person inside a candidate station
+    has reached it.
+
+    Attributes:
+        classes_: ``(K,)`` names of all goals and candidates seen in ``fit``, sorted.
     """
 
     def fit(self, X: Sequence[Trajectory], y: object = None) -> Self:
-        """Learn from complete walks.
+        """Learn from complete trajectories.
 
         Raises:
-            ValueError: No walks, prefixes, walks that do not fit their layout (naming the cell), or bad parameters.
+            ValueError: No trajectories, prefixes, trajectories that do not fit their layout (naming the cell), or bad
+                parameters.
         """
         self._check_parameters()
         super().fit(X, y)
-        walks = list(X)
-        for number, walk in enumerate(walks):
-            check_complete(walk, number)
-        self._prior = GoalPrior("empirical", walks, self.classes_)
-        self._learn(walks)
+        trajectories = list(X)
+        for number, trajectory in enumerate(trajectories):
+            check_complete(trajectory, number)
+        self._prior = GoalPrior("empirical", trajectories, self.classes_)
+        self._prior_weights = self._prior.of(self.classes_.tolist())
+        self._learn(trajectories)
         return self
 
     def _check_parameters(self) -> None:
         """Raise ``ValueError`` if a parameter is bad."""
 
     @abstractmethod
-    def _learn(self, walks: Sequence[Trajectory]) -> None:
-        """Learn from checked walks."""
+    def _learn(self, trajectories: Sequence[Trajectory]) -> None:
+        """Learn from checked trajectories; ``_prior_weights`` is the ``(K,)`` prior of all goals."""
 
     @abstractmethod
-    def _read(self, walk: Trajectory, cells: Steps) -> Floats:
+    def _weigh(self, trajectory: Trajectory, cells: Steps) -> Floats:
         """``(K,)`` weights of all goals >= 0 in the order of ``classes_``, given at least one floor cell."""
 
-    def candidate_probabilities(self, walk: Trajectory) -> Floats:
-        """``(len(walk.candidates),)`` probabilities in the order of the walk's candidates.
+    def candidate_probabilities(self, trajectory: Trajectory) -> Floats:
+        """``(len(trajectory.candidates),)`` probabilities in the order of the candidates.
 
         Raises:
-            ValueError: A walk that does not fit its layout.
+            ValueError: A trajectory that does not fit its layout.
         """
-        layout = check_walk(walk)
-        missing = [name for name in walk.candidates if name not in layout.stations]
+        layout = check_trajectory(trajectory)
+        missing = [name for name in trajectory.candidates if name not in layout.stations]
         if missing:
             raise ValueError(
                 f"the candidates {missing} are no stations of the layout, which has {list(layout.stations)}"
             )
-        prior = self._prior.of(walk.candidates)
-        cells: Steps = tuple(map(tuple, walk.states.tolist()))
+        prior = self._prior.of(trajectory.candidates)
+        cells: Steps = tuple(map(tuple, trajectory.states.tolist()))
         if not cells:
             return prior
         reached = layout.station_at(cells[-1])
         if reached is not None:
-            return np.array([float(name == reached) for name in walk.candidates])
-        weights = self._read(walk, cells)[self._columns(walk)]
+            return np.array([float(name == reached) for name in trajectory.candidates])
+        weights = self._weigh(trajectory, cells)[self.candidate_columns(trajectory)]
         total = weights.sum()
         return weights / total if total > 0 else prior
 
 
 def distinct_prefixes(
-    walks: Sequence[Trajectory], encoder: PrefixEncoder, classes: npt.NDArray[np.str_]
+    trajectories: Sequence[Trajectory], encoder: PrefixEncoder, classes: npt.NDArray[np.str_]
 ) -> tuple[Floats, Floats]:
-    """All prefixes of walks, equal ones once.
+    """All prefixes of trajectories, equal ones once.
 
     Args:
-        walks: Complete walks.
+        trajectories: Complete trajectories.
         encoder: Of their prefixes.
         classes: ``(K,)`` names of goals.
 
     Returns:
-        ``(U, width)`` features, and ``(U, K)`` weights: how many walks to each goal have this prefix, each counting by
-        the share of it that one cell is: who is judged at fractions observed meets the cells of short walks more often.
+        ``(U, width)`` features, and ``(U, K)`` weights: how many trajectories to each goal have this prefix. Each
+        counts by the share of it that one cell is: at fractions observed, cells of short ones are met more often.
     """
     column = {name: number for number, name in enumerate(classes.tolist())}
     rows: dict[tuple[object, ...], int] = {}
     places: dict[OvercookedLayout, int] = {}
     features: list[Floats] = []
     weights: list[Floats] = []
-    for walk in walks:
-        cells: Steps = tuple(map(tuple, walk.states[:-1].tolist()))
-        place = places.setdefault(_layout_of(walk), len(places))
+    for trajectory in trajectories:
+        cells: Steps = tuple(map(tuple, trajectory.states[:-1].tolist()))
+        place = places.setdefault(_layout_of(trajectory), len(places))
         for end in range(1, len(cells) + 1):
-            key = (place, walk.start, cells[:end])
+            key = (place, trajectory.start, cells[:end])
             row = rows.get(key)
             if row is None:
                 row = rows[key] = len(features)
-                features.append(encoder.encode(walk, cells[:end]))
+                features.append(encoder.encode(trajectory, cells[:end]))
                 weights.append(np.zeros(len(column)))
-            weights[row][column[walk.goal or ""]] += 1.0 / len(cells)
+            weights[row][column[trajectory.goal or ""]] += 1.0 / len(cells)
     return np.array(features), np.array(weights)

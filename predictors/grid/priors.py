@@ -1,4 +1,4 @@
-"""What is believed before a person moves."""
+"""The probabilities of goals before anything is observed."""
 
 from __future__ import annotations
 
@@ -21,26 +21,26 @@ PRIORS: Final = ("uniform", "empirical")
 class GoalPrior:
     """Probabilities of goals before anything is observed.
 
-    ``"uniform"``: all candidates alike. ``"empirical"``: as often as each was chosen where it could be, one more
-    choice of each goal added (Laplace), so that a goal that was never chosen stays possible.
+    ``"uniform"``: all candidates alike. ``"empirical"``: as often as each was chosen when it was a candidate, with one
+    more choice of each goal added (Laplace), so that a goal that was never chosen stays possible.
 
     Args:
         kind: ``"uniform"`` or ``"empirical"``.
-        walks: Trajectories to count goals in; those without a known goal are passed over.
+        trajectories: Trajectories to count goals in; those without a known goal are skipped.
         classes: ``(K,)`` names of all goals.
 
     Raises:
         ValueError: Another kind.
     """
 
-    def __init__(self, kind: Prior, walks: Sequence[Trajectory], classes: npt.NDArray[np.str_]) -> None:
+    def __init__(self, kind: Prior, trajectories: Sequence[Trajectory], classes: npt.NDArray[np.str_]) -> None:
         if kind not in PRIORS:
             raise ValueError(f"`prior` must be one of {PRIORS}, got {kind!r}")
         self._rates: dict[str, float] = {}
         if kind == "empirical":
-            known = [walk for walk in walks if walk.goal is not None]
-            chosen = Counter(walk.goal for walk in known)
-            offered = Counter(name for walk in known for name in walk.candidates)
+            known = [trajectory for trajectory in trajectories if trajectory.goal is not None]
+            chosen = Counter(trajectory.goal for trajectory in known)
+            offered = Counter(name for trajectory in known for name in trajectory.candidates)
             names = classes.tolist()
             self._rates = {name: (chosen[name] + 1.0) / (offered[name] + len(names)) for name in names}
 

@@ -1,4 +1,4 @@
-"""The heuristic that a person reaches for what is nearest."""
+"""The heuristic that people go for the nearest goal."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import Trajectory
 from predictors.base import TIE_TOLERANCE
-from predictors.grid.base import GridPredictor, check_walk, remaining_steps
+from predictors.grid.base import GridPredictor, check_trajectory, remaining_steps
 from predictors.reaching.base import goal_places, learn_places, straight_lines
 
 __all__ = ["ShortestDistance"]
@@ -21,13 +21,13 @@ Metric = Literal["manhattan", "geodesic", "euclidean"]
 class ShortestDistance(GridPredictor):
     r"""Predicts the candidate nearest to where the person is now; equally near ones share the probability.
 
-    The baseline of Tung et al. (HRI 2024). It knows neither the start nor the way so far. With nothing observed yet
+    The baseline of Tung et al. (HRI 2024). It uses neither the start nor the path so far. With nothing observed yet
     all candidates are equally probable.
 
     Args:
         metric: ``"manhattan"``: rows plus columns to the station, through walls. ``"geodesic"``: steps of the shortest
-            way into the station. ``"euclidean"``: the straight line, for reaches, to where a trajectory's
-            ``goal_positions`` say or else reaches ended in ``fit``.
+            path into the station. ``"euclidean"``: the straight line, for reaches, to the trajectory's
+            ``goal_positions`` or else to where reaches ended in ``fit``.
 
     Attributes:
         classes_: ``(K,)`` names of all goals and candidates seen in ``fit``, sorted.
@@ -36,8 +36,8 @@ class ShortestDistance(GridPredictor):
         >>> from legible_envs.overcooked import OvercookedLayout
         >>> from legible_envs.rollouts import Trajectory
         >>> kitchen = OvercookedLayout.from_ascii("XOXXXTX\nX     X\nXXXSXXX")
-        >>> walk = Trajectory([(1, 3), (1, 2)], goal="onion", candidates=("onion", "tomato"), layout=kitchen)
-        >>> ShortestDistance().fit([walk]).predict_proba([walk.first(1), walk]).tolist()
+        >>> trajectory = Trajectory([(1, 3), (1, 2)], goal="onion", candidates=("onion", "tomato"), layout=kitchen)
+        >>> ShortestDistance().fit([trajectory]).predict_proba([trajectory.first(1), trajectory]).tolist()
         [[0.5, 0.5], [1.0, 0.0]]
     """
 
@@ -50,39 +50,39 @@ class ShortestDistance(GridPredictor):
         self.places_ = learn_places(X) if self.metric == "euclidean" else {}
         return self
 
-    def candidate_probabilities(self, walk: Trajectory) -> npt.NDArray[np.float64]:
-        """``(len(walk.candidates),)`` probabilities in the order of the walk's candidates.
+    def candidate_probabilities(self, trajectory: Trajectory) -> npt.NDArray[np.float64]:
+        """``(len(trajectory.candidates),)`` probabilities in the order of the candidates.
 
         Raises:
-            ValueError: An unknown metric, or a walk that does not fit its layout.
+            ValueError: An unknown metric, or a trajectory that does not fit its layout.
         """
         if self.metric not in ("manhattan", "geodesic", "euclidean"):
             raise ValueError(f"`metric` must be 'manhattan', 'geodesic' or 'euclidean', got {self.metric!r}")
         if self.metric == "euclidean":
-            return self._nearest(self._straight_lines(walk))
-        layout = check_walk(walk)
-        count = len(walk.candidates)
-        if not walk.num_states:
+            return self._nearest(self._straight_lines(trajectory))
+        layout = check_trajectory(trajectory)
+        count = len(trajectory.candidates)
+        if not trajectory.num_states:
             return np.full(count, 1.0 / count)
-        row, col = walk.states[-1].tolist()
+        row, col = trajectory.states[-1].tolist()
         if self.metric == "geodesic":
-            distances = remaining_steps(layout, walk.candidates)[row, col]
+            distances = remaining_steps(layout, trajectory.candidates)[row, col]
         else:
-            missing = [goal for goal in walk.candidates if goal not in layout.stations]
+            missing = [goal for goal in trajectory.candidates if goal not in layout.stations]
             if missing:
                 raise ValueError(
                     f"the candidates {missing} are no stations of the layout, which has {list(layout.stations)}"
                 )
-            stations = np.array([layout.stations[goal] for goal in walk.candidates])
+            stations = np.array([layout.stations[goal] for goal in trajectory.candidates])
             distances = np.abs(stations - (row, col)).sum(axis=1).astype(np.float64)
         if np.isinf(distances).all():
-            raise ValueError(f"no candidate of {walk.candidates} can be reached from row {row}, column {col}")
+            raise ValueError(f"no candidate of {trajectory.candidates} can be reached from row {row}, column {col}")
         return self._nearest(distances)
 
-    def _straight_lines(self, walk: Trajectory) -> npt.NDArray[np.float64]:
-        if not walk.num_states:
-            return np.zeros(len(walk.candidates))
-        return straight_lines(walk.states[-1], goal_places(walk, self.places_))
+    def _straight_lines(self, trajectory: Trajectory) -> npt.NDArray[np.float64]:
+        if not trajectory.num_states:
+            return np.zeros(len(trajectory.candidates))
+        return straight_lines(trajectory.states[-1], goal_places(trajectory, self.places_))
 
     @staticmethod
     def _nearest(distances: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:

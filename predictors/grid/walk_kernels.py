@@ -1,4 +1,4 @@
-"""Sums over all walks between the cells of a kitchen, on plain arrays.
+"""Sums over all walks between the cells of a kitchen: paths that may enter a cell more than once. On plain arrays.
 
 A kitchen's floor is ``n`` cells in reading order, ``neighbours`` their ``(n, 4)`` indices (-1: none) and ``band`` the
 largest distance of two of them. A walk weighs ``exp(-costs of the cells it enters)``; entering the station, its last
@@ -163,11 +163,11 @@ def likelihood(
 def cheapest_costs(costs: Floats, neighbours: Integers, access: Floats) -> Floats:
     """Cost of the cheapest walk from each cell into each station (Bellman and Ford).
 
-    Costs below zero are welcome as long as no round trip pays, which a finite sum over walks guarantees; after as many
-    rounds as there are cells the search stops in any case.
+    Costs may be below zero as long as no cycle has a negative cost, which a finite sum over walks guarantees; after as
+    many rounds as there are cells the search stops in any case.
 
     Returns:
-        ``(n, K)``, ``inf`` where there is no way.
+        ``(n, K)``, ``inf`` where there is no path.
     """
     n, count = access.shape
     best = np.where(access > 0.0, 0.0, np.inf)
@@ -194,7 +194,7 @@ def walk_costs(costs: Floats, neighbours: Integers, band: int, access: Floats) -
     Each station's system is scaled by the cheapest costs first, so that nothing underflows however far it is.
 
     Returns:
-        ``(n, K)``, ``inf`` where there is no way, and whether the sums over walks are finite.
+        ``(n, K)``, ``inf`` where there is no path, and whether the sums over walks are finite.
     """
     n, count = access.shape
     cheapest = cheapest_costs(costs, neighbours, access)

@@ -1,4 +1,4 @@
-"""How likely walks are under given costs, summed over kitchens, and the costs that make them most likely."""
+"""The likelihood of trajectories under given costs, summed over kitchens, and the costs that maximise it."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ Floats = npt.NDArray[np.float64]
 FeatureMap = Callable[[OvercookedLayout], npt.NDArray[np.float64]]
 
 MOST_RATIONAL: Final = 10.0
-"""Uniform costs are sought up to here: people who never stray are described by infinite ones."""
+"""Upper bound of uniform costs: for participants who never stray the best ones are infinite."""
 
 _OUTSIDE: Final = 1e10
 
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """What the likelihood needs to know of all walks in one kitchen.
+    """Sufficient statistics of all trajectories in one kitchen for the likelihood.
 
     Attributes:
         graph: The floor in reach of the goals.
         visits: ``(n,)`` how often cells were entered, first cells not counted.
-        starts: ``(P,)`` first cell of each group of walks that share it and the goal.
+        starts: ``(P,)`` first cell of each group of trajectories that share it and the goal.
         goals: ``(P,)`` column of its goal.
-        weights: ``(P,)`` number of its walks.
+        weights: ``(P,)`` number of its trajectories.
     """
 
     graph: WalkGraph
@@ -45,7 +45,7 @@ class Evidence:
     weights: Floats
 
     def loss(self, costs: Floats) -> tuple[float, Floats]:
-        """Negative log-likelihood at ``(n,)`` costs and its gradient; ``inf`` where the sum over walks diverges."""
+        """Negative log-likelihood at ``(n,)`` costs and its gradient; ``inf`` where the sum over paths diverges."""
         graph = self.graph
         return likelihood(
             costs, graph.neighbours, graph.band, graph.access, self.visits, self.starts, self.goals, self.weights
@@ -60,7 +60,7 @@ class Fit:
         level: Cost of cells whose features are zero.
         weights: ``(k,)`` of the features.
         loss: Negative log-likelihood, without the penalty.
-        costs: ``(H, W)`` per kitchen, NaN where no walk goes.
+        costs: ``(H, W)`` per kitchen, NaN where no path leads.
         iterations: Iterations used.
         converged: Whether they sufficed.
     """
@@ -73,35 +73,35 @@ class Fit:
     converged: bool
 
 
-def collect_evidence(walks: Sequence[Trajectory]) -> dict[OvercookedLayout, Evidence]:
-    """Sum up complete walks, which must fit their layouts, per kitchen."""
+def collect_evidence(trajectories: Sequence[Trajectory]) -> dict[OvercookedLayout, Evidence]:
+    """Sum up complete trajectories, which must fit their layouts, per kitchen."""
     groups: dict[OvercookedLayout, list[Trajectory]] = {}
-    for walk in walks:
-        assert isinstance(walk.layout, OvercookedLayout)
-        groups.setdefault(walk.layout, []).append(walk)
+    for trajectory in trajectories:
+        assert isinstance(trajectory.layout, OvercookedLayout)
+        groups.setdefault(trajectory.layout, []).append(trajectory)
     return {layout: _sum_up(layout, members) for layout, members in groups.items()}
 
 
-def _sum_up(layout: OvercookedLayout, walks: Sequence[Trajectory]) -> Evidence:
-    names = tuple(sorted({walk.goal for walk in walks if walk.goal is not None}))
+def _sum_up(layout: OvercookedLayout, trajectories: Sequence[Trajectory]) -> Evidence:
+    names = tuple(sorted({trajectory.goal for trajectory in trajectories if trajectory.goal is not None}))
     graph = walk_graph(layout, names)
     visits = np.zeros(len(graph.cells))
     pairs: Counter[tuple[int, int]] = Counter()
-    for walk in walks:
-        numbers = graph.index[walk.states[:-1, 0], walk.states[:-1, 1]]
+    for trajectory in trajectories:
+        numbers = graph.index[trajectory.states[:-1, 0], trajectory.states[:-1, 1]]
         np.add.at(visits, numbers[1:], 1.0)
-        pairs[int(numbers[0]), names.index(walk.goal or "")] += 1
+        pairs[int(numbers[0]), names.index(trajectory.goal or "")] += 1
     keys = np.array(sorted(pairs), dtype=np.int64).reshape(-1, 2)
     weights = np.array([pairs[start, goal] for start, goal in keys.tolist()], dtype=np.float64)
     return Evidence(graph, visits, keys[:, 0].copy(), keys[:, 1].copy(), weights)
 
 
 def best_uniform_cost(evidence: Mapping[OvercookedLayout, Evidence]) -> float:
-    """The cost per step, the same for all cells, that makes the walks most likely; at most :data:`MOST_RATIONAL`."""
+    """The uniform cost per step that makes the trajectories most likely; at most :data:`MOST_RATIONAL`."""
     from scipy.optimize import brentq
 
-    # As costs fall to where the sum diverges, the expected length of walks grows without bound: the slope is negative
-    # there. It is not within reach of rounding errors only where walks may not stray at all.
+    # As costs fall to where the sum diverges, the expected length of paths grows without bound: the slope is negative
+    # there, except within rounding errors where no path can stray at all.
     low = max(part.graph.divergence_cost for part in evidence.values())
     low = max(low, -MOST_RATIONAL) + 1e-6
     high = max(MOST_RATIONAL, low + 1.0)
@@ -122,7 +122,7 @@ def minimise(
     max_iter: int,
     tol: float,
 ) -> Fit:
-    """Weights of features that make the walks most likely, ``l2 / 2 |weights|^2`` added to the loss.
+    """Weights of features that make the trajectories most likely, ``l2 / 2 |weights|^2`` added to the loss.
 
     Without features each cell in reach has a weight of its own, and all of them are pulled toward the uniform cost.
     With features the level of the costs is found along with the weights, and not pulled anywhere.

@@ -1,4 +1,4 @@
-"""What all neural predictors share: fitting, beliefs after every prefix, watching one person, and files."""
+"""What all neural predictors share: fitting, beliefs after every prefix, streams, and files."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import Cut, Trajectory
 from legible_envs.support.files import write_npz
-from predictors.base import FRACTIONS, GoalPredictor, GoalStream
-from predictors.grid.base import check_walk
+from predictors.base import FRACTIONS, GoalPredictor, GoalStream, check_trajectories
+from predictors.grid.base import check_trajectory
 from predictors.neural.encoding import Encoding
 from predictors.neural.networks import NUMPY, Network, Weights, softmax
 from predictors.neural.training import Examples, Training, require_torch, train
@@ -44,9 +44,9 @@ class NeuralPredictor(GoalPredictor):
         dropout: Share of each layer's outputs set to zero while training.
         batch_size: Trajectories per step.
         max_epochs: Most passes over the data.
-        patience: Passes without a better held-out loss after which a member is done.
+        patience: Passes without a lower held-out loss after which a member stops.
         validation_fraction: Share each member holds out; 0 holds out nothing (as where that would be less than two).
-        device: ``"auto"`` (a GPU if there is one), ``"cpu"``, ``"cuda"``, ….
+        device: ``"auto"`` (a GPU where there is one), ``"cpu"``, ``"cuda"``, ….
         random_state: Seed.
 
     Attributes:
@@ -117,39 +117,41 @@ class NeuralPredictor(GoalPredictor):
         """
         settings = self._settings()
         network = self._network()
-        walks = self._check_trajectories(X)
-        super().fit(walks)
-        self.goal_columns(walks)
-        encoding = Encoding.learn(walks)
-        self._check_walks(walks)
+        trajectories = check_trajectories(X)
+        super().fit(trajectories)
+        self.goal_columns(trajectories)
+        encoding = Encoding.learn(trajectories)
+        self._check_layouts(trajectories)
         require_torch()
-        self.prior_ = self._learn_prior(walks)
+        self.prior_ = self._learn_prior(trajectories)
         rng = np.random.default_rng(self.random_state)
         weights = network.initial_weights(self.members, encoding.width, len(self.classes_), rng)
         weights["out_bias"] = weights["out_bias"] + np.log(self.prior_)
-        examples = self._examples([walk for walk in walks if walk.num_states], encoding)
+        examples = self._examples([trajectory for trajectory in trajectories if trajectory.num_states], encoding)
         self.weights_, self.validation_loss_ = train(network, weights, examples, settings, rng)
         self.encoding_ = encoding
         return self
 
     def predict_proba(self, X: Sequence[Trajectory]) -> npt.NDArray[np.float64]:
         """See :meth:`GoalPredictor.predict_proba`; nothing observed is ``prior_`` among the candidates."""
-        walks = self._check_trajectories(X)
-        rows = [beliefs[-1] for beliefs in self._beliefs(walks)]
-        return np.array(rows, dtype=np.float64).reshape(len(walks), len(self.classes_))
+        trajectories = check_trajectories(X)
+        rows = [beliefs[-1] for beliefs in self._beliefs(trajectories)]
+        return np.array(rows, dtype=np.float64).reshape(len(trajectories), len(self.classes_))
 
     def predict_proba_at(
         self, X: Sequence[Trajectory], fractions: Sequence[float] = FRACTIONS, cut: Cut = "steps"
     ) -> npt.NDArray[np.float64]:
-        """See :meth:`GoalPredictor.predict_proba_at`; each trajectory is read once, as the networks are causal."""
-        walks = self._check_trajectories(X)
-        lengths = [[walk.prefix_length(fraction, cut) for fraction in fractions] for walk in walks]
-        read = self._beliefs([walk.first(max(row, default=0)) for walk, row in zip(walks, lengths, strict=True)])
-        rows = [beliefs[row] for beliefs, row in zip(read, lengths, strict=True)]
-        return np.array(rows, dtype=np.float64).reshape(len(walks), len(fractions), len(self.classes_))
+        """See :meth:`GoalPredictor.predict_proba_at`; one pass over each trajectory, as the networks are causal."""
+        trajectories = check_trajectories(X)
+        lengths = [[trajectory.prefix_length(fraction, cut) for fraction in fractions] for trajectory in trajectories]
+        after = self._beliefs(
+            [trajectory.first(max(row, default=0)) for trajectory, row in zip(trajectories, lengths, strict=True)]
+        )
+        rows = [beliefs[row] for beliefs, row in zip(after, lengths, strict=True)]
+        return np.array(rows, dtype=np.float64).reshape(len(trajectories), len(fractions), len(self.classes_))
 
     def stream(self, context: Trajectory) -> NeuralStream:
-        """Watch one person as they move, keeping what the networks remember; see :meth:`GoalPredictor.stream`."""
+        """Predict one person's goal while they move, keeping the networks' state; see :meth:`GoalPredictor.stream`."""
         return NeuralStream(self, context)
 
     # -- files --------------------------------------------------------------------------------------------------------
@@ -179,7 +181,7 @@ class NeuralPredictor(GoalPredictor):
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
-        """Read a predictor back; needs no torch, and runs nothing that is in the file.
+        """Read a predictor back; needs no torch and runs no code from the file.
 
         Raises:
             FileNotFoundError: No such file.
@@ -255,46 +257,46 @@ class NeuralPredictor(GoalPredictor):
             raise NotFittedError(f"this {type(self).__name__} is not fitted yet; call `fit` with trajectories first")
 
     @staticmethod
-    def _check_walks(walks: Sequence[Trajectory]) -> None:
-        for walk in walks:
-            if walk.layout is not None and walk.is_grid:
-                check_walk(walk)
+    def _check_layouts(trajectories: Sequence[Trajectory]) -> None:
+        for trajectory in trajectories:
+            if trajectory.layout is not None and trajectory.is_grid:
+                check_trajectory(trajectory)
 
-    def _learn_prior(self, walks: Sequence[Trajectory]) -> npt.NDArray[np.float64]:
-        chosen = np.bincount(self.goal_columns(walks), minlength=len(self.classes_)) + 1.0
-        return chosen / (self._allowed(walks).sum(axis=0) + len(self.classes_))
+    def _learn_prior(self, trajectories: Sequence[Trajectory]) -> npt.NDArray[np.float64]:
+        chosen = np.bincount(self.goal_columns(trajectories), minlength=len(self.classes_)) + 1.0
+        return chosen / (self._allowed(trajectories).sum(axis=0) + len(self.classes_))
 
-    def _allowed(self, walks: Sequence[Trajectory]) -> npt.NDArray[np.bool_]:
-        allowed = np.zeros((len(walks), len(self.classes_)), dtype=bool)
-        for row, walk in enumerate(walks):
-            allowed[row, self._columns(walk)] = True
+    def _allowed(self, trajectories: Sequence[Trajectory]) -> npt.NDArray[np.bool_]:
+        allowed = np.zeros((len(trajectories), len(self.classes_)), dtype=bool)
+        for row, trajectory in enumerate(trajectories):
+            allowed[row, self.candidate_columns(trajectory)] = True
         return allowed
 
-    def _examples(self, walks: Sequence[Trajectory], encoding: Encoding) -> Examples:
+    def _examples(self, trajectories: Sequence[Trajectory], encoding: Encoding) -> Examples:
         return Examples(
-            inputs=_padded([encoding.encode(walk) for walk in walks]).astype(np.float32),
-            lengths=np.array([walk.num_states for walk in walks], dtype=np.intp),
-            allowed=self._allowed(walks),
-            goals=self.goal_columns(walks),
+            inputs=_padded([encoding.encode(trajectory) for trajectory in trajectories]).astype(np.float32),
+            lengths=np.array([trajectory.num_states for trajectory in trajectories], dtype=np.intp),
+            allowed=self._allowed(trajectories),
+            goals=self.goal_columns(trajectories),
         )
 
-    def _beliefs(self, walks: Sequence[Trajectory]) -> list[npt.NDArray[np.float64]]:
+    def _beliefs(self, trajectories: Sequence[Trajectory]) -> list[npt.NDArray[np.float64]]:
         """For each trajectory ``(T+1, K)``: the belief after 0, 1, …, T states."""
         self._check_fitted()
-        allowed = self._allowed(walks)
-        for walk in walks:
-            self.encoding_.check(walk)
-        self._check_walks(walks)
-        found: list[npt.NDArray[np.float64]] = [np.zeros(0)] * len(walks)
-        by_length = sorted(range(len(walks)), key=lambda i: walks[i].num_states)
+        allowed = self._allowed(trajectories)
+        for trajectory in trajectories:
+            self.encoding_.check(trajectory)
+        self._check_layouts(trajectories)
+        found: list[npt.NDArray[np.float64]] = [np.zeros(0)] * len(trajectories)
+        by_length = sorted(range(len(trajectories)), key=lambda i: trajectories[i].num_states)
         network = self._network()
         for begin in range(0, len(by_length), _AT_ONCE):
             rows = by_length[begin : begin + _AT_ONCE]
-            inputs = _padded([self.encoding_.encode(walks[i]) for i in rows])
+            inputs = _padded([self.encoding_.encode(trajectories[i]) for i in rows])
             after = self._probabilities(network(NUMPY, self.weights_, inputs[None])[0], allowed[rows])
             before = self._prior(allowed[rows])
             for row, i in enumerate(rows):
-                found[i] = np.concatenate([before[row, None], after[row, : walks[i].num_states]])
+                found[i] = np.concatenate([before[row, None], after[row, : trajectories[i].num_states]])
         return found
 
     def _prior(self, allowed: npt.NDArray[np.bool_]) -> npt.NDArray[np.float64]:
@@ -310,7 +312,7 @@ class NeuralPredictor(GoalPredictor):
 
 
 class NeuralStream(GoalStream):
-    """A neural predictor's belief about one person, which goes on from what the networks remember.
+    """A neural predictor's belief about one person, which goes on from the networks' state.
 
     Each update runs the networks on one state: recurrent ones carry their hidden vectors, transformers their keys and
     values.
@@ -339,17 +341,17 @@ class NeuralStream(GoalStream):
             return
         try:
             self._advance()
-        except ValueError:  # a point that does not fit is not part of the way
+        except ValueError:  # a refused point is not part of the trajectory
             del self._points[count:], self._times[count:]
             raise
 
     def _advance(self) -> None:
         predictor = self._neural
         recent = np.array([self._points[0], *self._points[-2:]])
-        if len(self._points) < 3:  # most checks are of the kind of points, and one kind is one kind
+        if len(self._points) < 3:  # the kind of points cannot change later
             predictor.encoding_.check(self._observed())
         if self._context.layout is not None and predictor.encoding_.grid:
-            check_walk(self._observed())
+            check_trajectory(self._observed())
         rows = predictor.encoding_.rows(self._known, recent[0], recent[-2:-1], recent[-1:])
         logits, self._state = self._network(NUMPY, predictor.weights_, rows[None, None], self._state)
         self._row = predictor._probabilities(logits, self._allowed)[0, 0]

@@ -1,4 +1,4 @@
-"""What a network sees of a trajectory: one row of numbers for every state, from that state and earlier ones only."""
+"""The inputs of the networks: one row of numbers for every state, from that state and earlier ones only."""
 
 from __future__ import annotations
 
@@ -44,33 +44,33 @@ class Encoding:
     layouts: tuple[str, ...]
 
     @classmethod
-    def learn(cls, walks: Sequence[Trajectory]) -> Self:
+    def learn(cls, trajectories: Sequence[Trajectory]) -> Self:
         """Choose the encoding of trajectories of one kind, of which at least one is not empty.
 
         Raises:
             ValueError: Cells mixed with positions, different dimensions, or cells that are not ``(row, col)``.
         """
-        seen = [walk for walk in walks if walk.num_states]
+        seen = [trajectory for trajectory in trajectories if trajectory.num_states]
         if not seen:
-            raise ValueError(f"expected trajectories with states; all {len(walks)} are empty")
-        kinds = {(walk.is_grid, walk.states.shape[1]) for walk in seen}
+            raise ValueError(f"expected trajectories with states; all {len(trajectories)} are empty")
+        kinds = {(trajectory.is_grid, trajectory.states.shape[1]) for trajectory in seen}
         if len(kinds) > 1:
             names = sorted(f"{d}-d {'cells' if grid else 'positions'}" for grid, d in kinds)
             raise ValueError(f"expected trajectories of one kind, got {' and '.join(names)}")
         grid, dimension = kinds.pop()
         if grid and dimension != 2:
             raise ValueError(f"expected (row, col) cells, got {dimension}-d ones")
-        states = np.concatenate([walk.states for walk in seen])
-        offsets = np.concatenate([walk.states - walk.states[0] for walk in seen])
-        moves = np.concatenate([np.diff(walk.states, axis=0) for walk in seen])
-        layouts = {_layout_name(walk) for walk in seen}
+        states = np.concatenate([trajectory.states for trajectory in seen])
+        offsets = np.concatenate([trajectory.states - trajectory.states[0] for trajectory in seen])
+        moves = np.concatenate([np.diff(trajectory.states, axis=0) for trajectory in seen])
+        layouts = {_layout_name(trajectory) for trajectory in seen}
         return cls(
             grid=grid,
             dimension=dimension,
             shape=tuple((states.max(axis=0) + 1).tolist()) if grid else (),
             scale=float(max(states.max(), 1)) if grid else _root_mean_square(offsets),
             stride=1.0 if grid else _root_mean_square(moves),
-            starts=tuple(sorted({walk.start for walk in walks})),
+            starts=tuple(sorted({trajectory.start for trajectory in trajectories})),
             layouts=tuple(sorted(layouts)) if len(layouts) > 1 else (),
         )
 
@@ -80,33 +80,33 @@ class Encoding:
         cells = self.shape[0] * self.shape[1] if self.grid else 0
         return 2 * self.dimension + cells + len(self.starts) + len(self.layouts)
 
-    def check(self, walk: Trajectory) -> None:
-        """Say whether a trajectory is of the kind that was learned.
+    def check(self, trajectory: Trajectory) -> None:
+        """Check that a trajectory is of the kind that was learned.
 
         Raises:
             ValueError: It is not.
         """
-        if walk.num_states and (walk.is_grid, walk.states.shape[1]) != (self.grid, self.dimension):
+        if trajectory.num_states and (trajectory.is_grid, trajectory.states.shape[1]) != (self.grid, self.dimension):
             expected, got = (
                 f"{d}-d {'cells' if grid else 'positions'}"
-                for grid, d in ((self.grid, self.dimension), (walk.is_grid, walk.states.shape[1]))
+                for grid, d in ((self.grid, self.dimension), (trajectory.is_grid, trajectory.states.shape[1]))
             )
             raise ValueError(f"`fit` saw {expected}, this trajectory has {got}")
 
-    def context(self, walk: Trajectory) -> npt.NDArray[np.float64]:
+    def context(self, trajectory: Trajectory) -> npt.NDArray[np.float64]:
         """``(len(starts) + len(layouts),)`` what is known before the first state."""
-        known = [walk.start == name for name in self.starts]
+        known = [trajectory.start == name for name in self.starts]
         if self.layouts:
-            layout = _layout_name(walk)
+            layout = _layout_name(trajectory)
             known += [layout == name for name in self.layouts]
         return np.array(known, dtype=np.float64)
 
-    def encode(self, walk: Trajectory) -> npt.NDArray[np.float64]:
+    def encode(self, trajectory: Trajectory) -> npt.NDArray[np.float64]:
         """``(T, width)`` rows for all states of a trajectory."""
-        if not walk.num_states:
+        if not trajectory.num_states:
             return np.zeros((0, self.width))
-        previous = np.concatenate([walk.states[:1], walk.states[:-1]])
-        return self.rows(self.context(walk), walk.states[0], previous, walk.states)
+        previous = np.concatenate([trajectory.states[:1], trajectory.states[:-1]])
+        return self.rows(self.context(trajectory), trajectory.states[0], previous, trajectory.states)
 
     def rows(
         self,
@@ -144,5 +144,5 @@ def _root_mean_square(vectors: npt.NDArray[Any]) -> float:
     return length if length > _SMALLEST else 1.0
 
 
-def _layout_name(walk: Trajectory) -> str:
-    return walk.layout.layout_id if walk.layout is not None else walk.layout_name
+def _layout_name(trajectory: Trajectory) -> str:
+    return trajectory.layout.layout_id if trajectory.layout is not None else trajectory.layout_name

@@ -65,7 +65,7 @@ class Training:
 def train(
     network: Network, weights: Weights, examples: Examples, settings: Training, rng: np.random.Generator
 ) -> tuple[Weights, npt.NDArray[np.float64]]:
-    """Train ``M`` networks at once, each until its own held-out part no longer gets better.
+    """Train ``M`` networks at once, each until the loss on its own held-out part no longer falls.
 
     The loss of a trajectory is the mean, over its prefixes, of the negative log-probability of its goal among its
     candidates. Member ``m`` never trains on fold ``m`` of a split stratified by goal, and keeps the weights with which
@@ -97,7 +97,7 @@ def train(
             parameters.values(), lr=settings.learning_rate, weight_decay=settings.weight_decay
         )
         keeper = _Keeper(torch, parameters, settings)
-        judged, judged_weights = _rows_to_judge(held_out)
+        validated, counted = _validation_rows(held_out)
         history: list[npt.NDArray[np.float64]] = []
         while len(history) < settings.max_epochs and not keeper.finished:
             for batch in _batches(examples.lengths, settings.batch_size, rng):
@@ -106,9 +106,9 @@ def train(
                 losses.sum().backward()
                 optimizer.step()
             with torch.no_grad():
-                losses = data.losses(network, evaluation, parameters, judged, judged_weights)
+                losses = data.losses(network, evaluation, parameters, validated, counted)
             history.append(losses.cpu().numpy().astype(np.float64))
-            keeper.judge(history[-1])
+            keeper.keep(history[-1])
         trained = {name: value.cpu().numpy().astype(np.float64) for name, value in keeper.best.items()}
     return trained, np.array(history)
 
@@ -156,7 +156,7 @@ class _Keeper:
         self._waited = np.zeros(settings.members, dtype=np.intp)
         self.best = {name: value.detach().clone() for name, value in parameters.items()}
 
-    def judge(self, losses: npt.NDArray[np.float64]) -> None:
+    def keep(self, losses: npt.NDArray[np.float64]) -> None:
         better = (losses < self._lowest) & (self._waited < self._patience)
         self._lowest[better] = losses[better]
         self._waited = np.where(better, 0, self._waited + 1)
@@ -185,7 +185,7 @@ def _held_out(goals: npt.NDArray[np.intp], settings: Training, rng: np.random.Ge
     return held_out
 
 
-def _rows_to_judge(held_out: npt.NDArray[np.bool_]) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.bool_]]:
+def _validation_rows(held_out: npt.NDArray[np.bool_]) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.bool_]]:
     """Rows ``(1 or M, v)`` and whether they count ``(M, v)``: what each member holds out, or all if nothing is."""
     members, number = held_out.shape
     if not held_out.any():

@@ -1,4 +1,4 @@
-"""Where goals are, for reaches: told by the trajectory, or learned from where earlier reaches ended."""
+"""Where the goals of reaches are: given by the trajectory, or learned from where earlier reaches ended."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import Trajectory
-from predictors.base import GoalPredictor
+from predictors.base import GoalPredictor, check_trajectories
 
 __all__ = ["PlacePredictor", "goal_places", "learn_places", "straight_lines"]
 
@@ -24,35 +24,38 @@ def learn_places(X: Sequence[Trajectory]) -> dict[str, npt.NDArray[np.float64]]:
         ValueError: Reaches of different dimensions.
     """
     ends: dict[str, list[npt.NDArray[np.float64]]] = {}
-    for walk in X:
-        if walk.complete and walk.num_states and walk.goal is not None:
-            ends.setdefault(walk.goal, []).append(walk.states[-1].astype(np.float64))
+    for trajectory in X:
+        if trajectory.complete and trajectory.num_states and trajectory.goal is not None:
+            ends.setdefault(trajectory.goal, []).append(trajectory.states[-1].astype(np.float64))
     dimensions = sorted({len(end) for found in ends.values() for end in found})
     if len(dimensions) > 1:
         raise ValueError(f"all reaches must have one dimension, got {dimensions}")
     return {goal: np.mean(found, axis=0) for goal, found in ends.items()}
 
 
-def goal_places(walk: Trajectory, learned: Places) -> npt.NDArray[np.float64]:
-    """``(len(walk.candidates), d)`` where the candidates are.
+def goal_places(trajectory: Trajectory, learned: Places) -> npt.NDArray[np.float64]:
+    """``(len(trajectory.candidates), d)`` where the candidates are.
 
     Args:
-        walk: Its ``goal_positions`` count where it has them.
+        trajectory: Its ``goal_positions`` count where it has them.
         learned: What :func:`learn_places` found, for the others.
 
     Raises:
-        ValueError: A candidate whose place nobody told and no reach ended at, or another dimension than the states'.
+        ValueError: A candidate without a place (no ``goal_positions``, and no reach in ``fit`` ended there), or places
+            of another dimension than the states.
     """
-    if walk.goal_positions is not None:
-        return np.array(walk.goal_positions)
-    missing = [goal for goal in walk.candidates if goal not in learned]
+    if trajectory.goal_positions is not None:
+        return np.array(trajectory.goal_positions)
+    missing = [goal for goal in trajectory.candidates if goal not in learned]
     if missing:
         raise ValueError(
             f"unknown places of {missing}: the trajectory has no `goal_positions`, and no reach in `fit` ended there"
         )
-    places = np.array([learned[goal] for goal in walk.candidates])
-    if walk.num_states and places.shape[1] != walk.states.shape[1]:
-        raise ValueError(f"expected states of dimension {places.shape[1]} as in `fit`, got {walk.states.shape[1]}")
+    places = np.array([learned[goal] for goal in trajectory.candidates])
+    if trajectory.num_states and places.shape[1] != trajectory.states.shape[1]:
+        raise ValueError(
+            f"expected states of dimension {places.shape[1]} as in `fit`, got {trajectory.states.shape[1]}"
+        )
     return places
 
 
@@ -81,18 +84,18 @@ class PlacePredictor(GoalPredictor):
     def weigh(self, states: npt.NDArray[np.floating], places: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """``(n,)`` weights >= 0, not all 0, of goals at ``(n, d)`` places after ``(T, d)`` states, T >= 1."""
 
-    def weigh_walk(self, walk: Trajectory) -> npt.NDArray[np.float64]:
-        """``(n,)`` weights of a reach's candidates after at least one state; for subclasses that look at more."""
-        return self.weigh(walk.states, goal_places(walk, self.places_))
+    def weigh_trajectory(self, trajectory: Trajectory) -> npt.NDArray[np.float64]:
+        """``(n,)`` weights of the candidates after at least one state, for subclasses that use more than the states."""
+        return self.weigh(trajectory.states, goal_places(trajectory, self.places_))
 
     def predict_proba(self, X: Sequence[Trajectory]) -> npt.NDArray[np.float64]:
         """See :meth:`GoalPredictor.predict_proba`."""
-        walks = self._check_trajectories(X)
-        columns = [self._columns(walk) for walk in walks]
-        probabilities = np.zeros((len(walks), len(self.classes_)))
-        for row, walk in enumerate(walks):
-            weights = np.ones(len(walk.candidates))
-            if walk.num_states:
-                weights = self.weigh_walk(walk)
+        trajectories = check_trajectories(X)
+        columns = [self.candidate_columns(trajectory) for trajectory in trajectories]
+        probabilities = np.zeros((len(trajectories), len(self.classes_)))
+        for row, trajectory in enumerate(trajectories):
+            weights = np.ones(len(trajectory.candidates))
+            if trajectory.num_states:
+                weights = self.weigh_trajectory(trajectory)
             probabilities[row, columns[row]] = weights / weights.sum()
         return probabilities

@@ -1,4 +1,4 @@
-"""Plain classifiers of the hand's position, velocity and time: what a predictor of reaches must beat."""
+"""Baselines for reaches: plain classifiers of the hand's position, velocity and time."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
 from legible_envs.rollouts.trajectory import Cut, Trajectory
-from predictors.base import FRACTIONS, GoalPredictor
+from predictors.base import FRACTIONS, GoalPredictor, check_trajectories
 from predictors.reaching.features import Reach, check_dimension, check_reaches
 
 __all__ = ["ReachLogistic", "ReachNeighbours"]
 
 
 class _MomentClassifier(GoalPredictor):
-    """Learns from every moment of every reach, and looks at the newest moment only.
+    """Learns from every moment of every reach, and predicts from the newest moment only.
 
-    The features are the position and velocity relative to the start, and the time since. Goals that are no candidates
-    are masked; with no or one position observed the belief is how often each goal was reached in ``fit``.
+    The features are the position and velocity relative to the start, and the time since. Goals that are not
+    candidates are masked; with no or one position observed the belief is how often each goal was reached in ``fit``.
     """
 
     def fit(self, X: Sequence[Trajectory], y: object = None) -> Self:
@@ -38,12 +38,12 @@ class _MomentClassifier(GoalPredictor):
             ValueError: Parameters out of range; a prefix, an unknown goal, a reach of one state, mixed dimensions.
         """
         super().fit(X, y)
-        walks = list(X)
-        self.n_dims_ = check_reaches(walks)
-        goals = np.array([walk.goal for walk in walks])
+        trajectories = list(X)
+        self.n_dims_ = check_reaches(trajectories)
+        goals = np.array([trajectory.goal for trajectory in trajectories])
         self.goals_, counts = np.unique(goals, return_counts=True)
         self.prior_ = counts / counts.sum()
-        moments = [_moments(walk)[1:] for walk in walks]
+        moments = [_moments(trajectory)[1:] for trajectory in trajectories]
         labels = np.repeat(np.searchsorted(self.goals_, goals), [len(rows) for rows in moments])
         self._classifier = self._make(len(labels)).fit(np.concatenate(moments), labels) if len(counts) > 1 else None
         return self
@@ -53,50 +53,50 @@ class _MomentClassifier(GoalPredictor):
         """An unfitted classifier for so many moments."""
 
     def _smoothed(self, weights: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        """``(n, G)`` probabilities of the classifier, as they are unless it is surer than it can be."""
+        """``(n, G)`` probabilities of the classifier, for subclasses that smooth them."""
         return weights
 
     def predict_proba(self, X: Sequence[Trajectory]) -> npt.NDArray[np.float64]:
         """See :meth:`GoalPredictor.predict_proba`."""
-        walks = self._check_trajectories(X)
+        trajectories = check_trajectories(X)
         rows: list[npt.NDArray[np.float64] | None] = []
-        for walk in walks:
-            self._columns(walk)
-            check_dimension(walk, self.n_dims_)
-            rows.append(_moments(walk)[-1] if walk.num_states > 1 else None)
-        return self._beliefs(walks, rows)
+        for trajectory in trajectories:
+            self.candidate_columns(trajectory)
+            check_dimension(trajectory, self.n_dims_)
+            rows.append(_moments(trajectory)[-1] if trajectory.num_states > 1 else None)
+        return self._beliefs(trajectories, rows)
 
     def predict_proba_at(
         self, X: Sequence[Trajectory], fractions: Sequence[float] = FRACTIONS, cut: Cut = "steps"
     ) -> npt.NDArray[np.float64]:
         """See :meth:`GoalPredictor.predict_proba_at`; features of a reach are computed once for all fractions."""
-        walks = self._check_trajectories(X)
+        trajectories = check_trajectories(X)
         rows: list[npt.NDArray[np.float64] | None] = []
-        for walk in walks:
-            self._columns(walk)
-            check_dimension(walk, self.n_dims_)
-            moments = _moments(walk)
-            lengths = [walk.prefix_length(fraction, cut) for fraction in fractions]
+        for trajectory in trajectories:
+            self.candidate_columns(trajectory)
+            check_dimension(trajectory, self.n_dims_)
+            moments = _moments(trajectory)
+            lengths = [trajectory.prefix_length(fraction, cut) for fraction in fractions]
             rows += [moments[length - 1] if length > 1 else None for length in lengths]
-        beliefs = self._beliefs([walk for walk in walks for _ in fractions], rows)
-        return beliefs.reshape(len(walks), len(fractions), len(self.classes_))
+        beliefs = self._beliefs([trajectory for trajectory in trajectories for _ in fractions], rows)
+        return beliefs.reshape(len(trajectories), len(fractions), len(self.classes_))
 
     def _beliefs(
-        self, walks: Sequence[Trajectory], rows: Sequence[npt.NDArray[np.float64] | None]
+        self, trajectories: Sequence[Trajectory], rows: Sequence[npt.NDArray[np.float64] | None]
     ) -> npt.NDArray[np.float64]:
-        """``(n, C)`` beliefs; None for a walk stands for nothing known."""
-        columns = [self._columns(walk) for walk in walks]
-        weights = np.tile(self.prior_, (len(walks), 1))
+        """``(n, C)`` beliefs; a row of None stands for nothing observed."""
+        columns = [self.candidate_columns(trajectory) for trajectory in trajectories]
+        weights = np.tile(self.prior_, (len(trajectories), 1))
         seen = [i for i, row in enumerate(rows) if row is not None]
         if seen and self._classifier is not None:
             weights[seen] = self._smoothed(self._classifier.predict_proba(np.array([rows[i] for i in seen])))
-        probabilities = np.zeros((len(walks), len(self.classes_)))
+        probabilities = np.zeros((len(trajectories), len(self.classes_)))
         places = np.searchsorted(self.classes_, self.goals_)
         for i, candidates in enumerate(columns):
             full = np.zeros(len(self.classes_))
             full[places] = weights[i]
             chosen = full[candidates]
-            if chosen.sum() <= 0:  # the classifier is sure of a goal that is no candidate, or none was ever reached
+            if chosen.sum() <= 0:  # all probability is on other goals, or no candidate was ever reached
                 full[places] = self.prior_
                 chosen = full[candidates] if full[candidates].any() else np.ones(len(candidates))
             probabilities[i, candidates] = chosen / chosen.sum()
@@ -108,7 +108,7 @@ class ReachLogistic(_MomentClassifier):
 
     Args:
         C: Inverse strength of the L2 penalty on standardised features.
-        degree: 1: the features. 2: also their squares and products: better, and ten times slower to fit.
+        degree: 1: the features. 2: also their squares and products: more accurate, and ten times slower to fit.
         max_iter: Most iterations; scikit-learn warns where they were not enough.
 
     Attributes:
@@ -136,10 +136,10 @@ class ReachLogistic(_MomentClassifier):
 class ReachNeighbours(_MomentClassifier):
     """The goals of the most similar moments of earlier reaches, by standardised position, velocity and time.
 
-    The prior votes like one more neighbour, so that nothing is impossible because few moments were asked.
+    The prior votes like one more neighbour, so that few neighbours never make a goal impossible.
 
     Args:
-        n_neighbors: How many moments vote; all if there are fewer.
+        n_neighbors: Number of moments that vote; all if there are fewer.
 
     Attributes:
         classes_: ``(C,)`` names of all goals and candidates seen in ``fit``, sorted.
@@ -160,7 +160,7 @@ class ReachNeighbours(_MomentClassifier):
         return (self.n_neighbors_ * weights + self.prior_) / (self.n_neighbors_ + 1)
 
 
-def _moments(walk: Trajectory) -> npt.NDArray[np.float64]:
+def _moments(trajectory: Trajectory) -> npt.NDArray[np.float64]:
     """``(T, 2 d + 1)`` position, velocity and time of every sample."""
-    reach = Reach(walk)
+    reach = Reach(trajectory)
     return np.column_stack([reach.features(True), reach.times])

@@ -1,4 +1,4 @@
-"""Eq. 1 of Tung et al. (HRI 2024) for a hand that moves freely."""
+"""Bayesian goal inference (Eq. 1 of Tung et al., HRI 2024) for a hand that moves freely."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ class StraightLineBayesian(PlacePredictor):
     r"""The posterior over goals of a hand that moves nearly straight.
 
     ``P(G | S->Q) ∝ exp(-beta (C(S->Q) + C*(Q->G) - C*(S->G)))`` (Eq. 1 of Tung et al., HRI 2024, after Dragan and
-    Srinivasa, 2013) with a uniform prior; the cost of a way is its length. The length so far is the same for every goal
-    and cancels. With nothing or one position observed the belief is the prior, exactly.
+    Srinivasa, 2013) with a uniform prior; the cost of a path is its length. The length so far is the same for every
+    goal and cancels. With nothing or one position observed the belief is the prior, exactly.
 
-    The cheapest way ``C*`` is the straight line to where a trajectory's ``goal_positions`` say that goals are, else to
-    where reaches ended in ``fit``. Over a :class:`~legible_envs.tabletop.TabletopLayout` it is the shortest path among
-    the obstacles to the object of that name: a hand inside an obstacle counts as being at the nearest free point, and
-    where there is no way the straight line counts, so that every cost is finite. This is the belief of
+    The shortest path, of length ``C*``, is the straight line to a goal's place: the trajectory's ``goal_positions``, or
+    else where reaches ended in ``fit``. Over a :class:`~legible_envs.tabletop.TabletopLayout` it leads round the
+    obstacles to the object of that name: a hand inside an obstacle counts as being at the nearest free point, and
+    where there is no path the straight line counts, so that every cost is finite. This is the belief of
     :class:`~legible_envs.tabletop.partner.belief.EqOneBelief`.
 
     Args:
@@ -57,23 +57,29 @@ class StraightLineBayesian(PlacePredictor):
         if isinstance(self.beta, bool) or not isinstance(self.beta, int | float) or not 0 <= self.beta < np.inf:
             raise ValueError(f"`beta` must be a finite number >= 0, got {self.beta!r}")
 
-    def weigh_walk(self, walk: Trajectory) -> npt.NDArray[np.float64]:
-        """See :meth:`PlacePredictor.weigh_walk`.
+    def weigh_trajectory(self, trajectory: Trajectory) -> npt.NDArray[np.float64]:
+        """See :meth:`PlacePredictor.weigh_trajectory`.
 
         Raises:
             ValueError: A candidate is no object of the trajectory's table.
         """
-        if not self.obstacles or not isinstance(walk.layout, TabletopLayout):
-            return super().weigh_walk(walk)
+        if not self.obstacles or not isinstance(trajectory.layout, TabletopLayout):
+            return super().weigh_trajectory(trajectory)
         from legible_envs.tabletop.partner.belief import EqOneBelief
 
         self._check_beta()
-        if walk.is_grid or walk.states.shape[1] != 2:
-            raise ValueError(f"expected positions (x, y) on a table, got {walk.states.shape[1]}-d {walk.states.dtype}")
+        if trajectory.is_grid or trajectory.states.shape[1] != 2:
+            raise ValueError(
+                f"expected positions (x, y) on a table, got {trajectory.states.shape[1]}-d {trajectory.states.dtype}"
+            )
         belief = EqOneBelief(
-            walk.layout, self.beta, start=walk.states[0], goals=walk.candidates, positions=walk.goal_positions
+            trajectory.layout,
+            self.beta,
+            start=trajectory.states[0],
+            goals=trajectory.candidates,
+            positions=trajectory.goal_positions,
         )
-        return np.array(list(belief.update(walk.states[-1]).values()))
+        return np.array(list(belief.update(trajectory.states[-1]).values()))
 
     def weigh(self, states: npt.NDArray[np.floating], places: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """See :meth:`PlacePredictor.weigh`."""

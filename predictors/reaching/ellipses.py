@@ -1,4 +1,4 @@
-"""How people's reaches spread over time: determinant and trace, ellipses over the table, and a picture of them."""
+"""The spread of reaches over time: determinant and trace, ellipses over the table, and a picture of them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 __all__ = ["draw_reaches", "ellipse_table", "spread_table"]
 
-# Okabe and Ito's colours, told apart by colour-blind people too.
+# Okabe and Ito's colours, distinct for colour-blind readers too.
 _COLOURS: Final = (
     (0, 114, 178),
     (230, 159, 0),

@@ -26,10 +26,10 @@ class Reach:
         times: ``(T,)`` seconds since the first sample.
     """
 
-    def __init__(self, walk: Trajectory) -> None:
-        states = walk.states.astype(np.float64)
+    def __init__(self, trajectory: Trajectory) -> None:
+        states = trajectory.states.astype(np.float64)
         self.points: _Array = states - states[:1]
-        self.times: _Array = walk.times - walk.times[:1]
+        self.times: _Array = trajectory.times - trajectory.times[:1]
         self._origin: tuple[_Array, float] | None = None
         self._last: tuple[_Array, float, _Array] | None = None
 
@@ -87,30 +87,30 @@ def resample(features: _Array, times: _Array, count: int) -> _Array:
     return np.stack([np.interp(at, times, column) for column in features.T], axis=1)
 
 
-def check_reaches(walks: Sequence[Trajectory]) -> int:
+def check_reaches(trajectories: Sequence[Trajectory]) -> int:
     """The dimension of reaches that can be learned from.
 
     Raises:
         ValueError: An unknown goal, a prefix, fewer than two states, no duration, or mixed dimensions.
     """
-    for number, walk in enumerate(walks):
-        if walk.goal is None:
+    for number, trajectory in enumerate(trajectories):
+        if trajectory.goal is None:
             raise ValueError(f"reach {number} has no known goal to learn from")
-        if not walk.complete:
+        if not trajectory.complete:
             raise ValueError(f"reach {number} is a prefix; `fit` learns from complete reaches")
-        if walk.num_states < 2 or not walk.times[-1] > walk.times[0]:
+        if trajectory.num_states < 2 or not trajectory.times[-1] > trajectory.times[0]:
             raise ValueError(
-                f"reach {number} has {walk.num_states} states and no duration; it needs at least 2 and some"
+                f"reach {number} has {trajectory.num_states} states and no duration; it needs at least 2 and some"
             )
-        if walk.states.shape[1] != walks[0].states.shape[1]:
+        if trajectory.states.shape[1] != trajectories[0].states.shape[1]:
             raise ValueError(
-                f"all reaches must have one dimension; reach 0 has {walks[0].states.shape[1]}, reach {number} has "
-                f"{walk.states.shape[1]}"
+                f"all reaches must have one dimension; reach 0 has {trajectories[0].states.shape[1]}, reach {number} "
+                f"has {trajectory.states.shape[1]}"
             )
-    return int(walks[0].states.shape[1])
+    return int(trajectories[0].states.shape[1])
 
 
-def check_dimension(walk: Trajectory, dimension: int) -> None:
+def check_dimension(trajectory: Trajectory, dimension: int) -> None:
     """Refuse states of another dimension than those learned from."""
-    if walk.num_states and walk.states.shape[1] != dimension:
-        raise ValueError(f"expected states of dimension {dimension} as in `fit`, got {walk.states.shape[1]}")
+    if trajectory.num_states and trajectory.states.shape[1] != dimension:
+        raise ValueError(f"expected states of dimension {dimension} as in `fit`, got {trajectory.states.shape[1]}")

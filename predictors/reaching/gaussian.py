@@ -1,4 +1,4 @@
-"""The time-series Gaussian: reaches to one goal look alike at the same moment."""
+"""The time-series Gaussian: at the same moment, reaches to one goal are alike."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import Cut, Trajectory
-from predictors.base import FRACTIONS, GoalPredictor, GoalStream
+from predictors.base import FRACTIONS, GoalPredictor, GoalStream, check_trajectories
 from predictors.reaching.alignment_kernels import dba_step, match_means, pairwise_costs
 from predictors.reaching.features import Reach, check_dimension, check_reaches, resample
 from predictors.reaching.open_end_kernels import observe
@@ -28,11 +28,11 @@ class TimeSeriesGaussian(GoalPredictor):
     For every goal, its reaches are resampled to ``n_samples`` steps and aligned in time; each step has a mean and a
     covariance over reaches. A person's motion is aligned to each goal's mean online, and goals are weighed by the mean
     log-density of the samples so far, with a uniform prior (Perez-D'Arpino and Shah, ICRA 2015, as used by Tung et al.,
-    HRI 2024). All positions are relative to the reach's first, which therefore tells nothing by itself: with no or one
+    HRI 2024). All positions are relative to the reach's first, which therefore carries no information: with no or one
     position observed the belief is the prior.
 
-    A goal reached once borrows the covariance of the others (the floor alone if there is none); a goal that was a
-    candidate and never reached gets no probability beside goals that were.
+    A goal reached once borrows the covariance of the others (the floor alone if there is none). A candidate that was
+    never reached in ``fit`` gets no probability beside candidates that were.
 
     Args:
         n_samples: Steps K of the mean reach.
@@ -44,17 +44,17 @@ class TimeSeriesGaussian(GoalPredictor):
         online: Which step of a goal's mean a sample is compared with: ``"open-end"``: by warping the samples so far to
             a beginning of the mean. ``"index"``: by the time since the first sample, in units of the mean duration of
             reaches to the goal. ``"fraction"``: by the share of the reach's own duration, as in the paper; this needs
-            the duration of a reach that is still going on, so that only :meth:`predict_proba_at` and complete
-            trajectories can be asked.
+            the whole duration, so it works only with complete trajectories and :meth:`predict_proba_at`, not while a
+            reach is going on.
         band: How far warping may move a sample from where the clock says, as a share of the reach, offline and online;
             None: anywhere.
         floor: Standard deviation added to every position, in metres.
         velocity_floor: The same for velocities, in metres per second.
         half_life: Seconds after which a sample counts half; None: all samples count the same; 0: only the newest.
 
-    On 1,258 real pointing movements to ten targets by 53 people (mean accuracy over 10..90 %, people held out) the
-    defaults read .71, ``online="index"`` .73, with ``velocity=True`` .75, and ``velocity=True, half_life=0`` .78 in
-    either mode: old samples mostly repeat what the newest one knows.
+    On 1,258 real pointing movements to ten targets by 53 participants (mean accuracy over 10..90 %, participants
+    held out) the defaults reach .71, ``online="index"`` .73, with ``velocity=True`` .75, and ``velocity=True,
+    half_life=0`` .78 in either mode: old samples mostly repeat the information in the newest one.
 
     Attributes:
         classes_: ``(C,)`` names of all goals and candidates seen in ``fit``, sorted.
@@ -66,9 +66,9 @@ class TimeSeriesGaussian(GoalPredictor):
 
     Example:
         >>> from legible_envs.rollouts import Trajectory
-        >>> way = np.linspace(0, 1, 20)[:, None]
+        >>> progress = np.linspace(0, 1, 20)[:, None]
         >>> ends = {"a": (-1, 1), "b": (1, 1)}
-        >>> reach = {g: Trajectory(way * end, goal=g, candidates=("a", "b")) for g, end in ends.items()}
+        >>> reach = {g: Trajectory(progress * end, goal=g, candidates=("a", "b")) for g, end in ends.items()}
         >>> gaussian = TimeSeriesGaussian().fit(list(reach.values()))
         >>> gaussian.predict([reach["a"].first(8), reach["b"].first(8)]).tolist()
         ['a', 'b']
@@ -109,11 +109,11 @@ class TimeSeriesGaussian(GoalPredictor):
         """
         self._check_parameters()
         super().fit(X, y)
-        walks = list(X)
-        self.n_dims_ = check_reaches(walks)
+        trajectories = list(X)
+        self.n_dims_ = check_reaches(trajectories)
         by_goal: dict[str, list[Reach]] = {}
-        for walk in walks:
-            by_goal.setdefault(str(walk.goal), []).append(Reach(walk))
+        for trajectory in trajectories:
+            by_goal.setdefault(str(trajectory.goal), []).append(Reach(trajectory))
         self.goals_ = np.array(sorted(by_goal))
         self.counts_ = np.array([len(by_goal[goal]) for goal in self.goals_])
         self.durations_ = np.array([np.mean([r.duration for r in by_goal[goal]]) for goal in self.goals_])
@@ -179,52 +179,54 @@ class TimeSeriesGaussian(GoalPredictor):
         """See :meth:`GoalPredictor.predict_proba`.
 
         Raises:
-            ValueError: Also a prefix if ``online="fraction"``, which needs to know the duration.
+            ValueError: Also a prefix if ``online="fraction"``, which needs the whole duration.
         """
-        walks = self._check_trajectories(X)
-        columns = [self._columns(walk) for walk in walks]
-        probabilities = np.zeros((len(walks), len(self.classes_)))
-        for row, walk in enumerate(walks):
-            if self.online == "fraction" and not walk.complete and walk.num_states > 1:
+        trajectories = check_trajectories(X)
+        columns = [self.candidate_columns(trajectory) for trajectory in trajectories]
+        probabilities = np.zeros((len(trajectories), len(self.classes_)))
+        for row, trajectory in enumerate(trajectories):
+            if self.online == "fraction" and not trajectory.complete and trajectory.num_states > 1:
                 raise ValueError(
-                    "online='fraction' needs the duration of the whole reach, which a prefix does not tell; use "
+                    "online='fraction' needs the duration of the whole reach, which a prefix lacks; use "
                     "`predict_proba_at`, or online='open-end' for motion that is still going on"
                 )
-            duration = float(walk.times[-1] - walk.times[0]) if walk.num_states else 0.0
-            scores = self._scores(walk, duration)
-            probabilities[row, columns[row]] = self._belief(scores[-1] if len(scores) else None, walk.candidates)
+            duration = float(trajectory.times[-1] - trajectory.times[0]) if trajectory.num_states else 0.0
+            scores = self._scores(trajectory, duration)
+            probabilities[row, columns[row]] = self._belief(scores[-1] if len(scores) else None, trajectory.candidates)
         return probabilities
 
     def predict_proba_at(
         self, X: Sequence[Trajectory], fractions: Sequence[float] = FRACTIONS, cut: Cut = "steps"
     ) -> npt.NDArray[np.float64]:
         """See :meth:`GoalPredictor.predict_proba_at`; one pass over each reach answers all fractions."""
-        walks = self._check_trajectories(X)
-        probabilities = np.zeros((len(walks), len(fractions), len(self.classes_)))
-        for row, walk in enumerate(walks):
-            columns = self._columns(walk)
-            lengths = [walk.prefix_length(fraction, cut) for fraction in fractions]
-            scores = self._scores(walk.first(max(lengths, default=0)), float(walk.times[-1] - walk.times[0]))
+        trajectories = check_trajectories(X)
+        probabilities = np.zeros((len(trajectories), len(fractions), len(self.classes_)))
+        for row, trajectory in enumerate(trajectories):
+            columns = self.candidate_columns(trajectory)
+            lengths = [trajectory.prefix_length(fraction, cut) for fraction in fractions]
+            scores = self._scores(
+                trajectory.first(max(lengths, default=0)), float(trajectory.times[-1] - trajectory.times[0])
+            )
             for i, length in enumerate(lengths):
-                probabilities[row, i, columns] = self._belief(scores[length - 1], walk.candidates)
+                probabilities[row, i, columns] = self._belief(scores[length - 1], trajectory.candidates)
         return probabilities
 
     def stream(self, context: Trajectory) -> GoalStream:
-        """See :meth:`GoalPredictor.stream`; an update takes the same time however long the reach has lasted.
+        """See :meth:`GoalPredictor.stream`; an update takes the same time at every length of the reach.
 
         Raises:
-            ValueError: ``online="fraction"``, which cannot be asked while a reach is going on.
+            ValueError: ``online="fraction"``, which is not causal.
         """
         if self.online == "fraction":
             raise ValueError("online='fraction' needs the duration of the whole reach; stream with online='open-end'")
         return ReachStream(self, context)
 
-    def _scores(self, walk: Trajectory, duration: float) -> npt.NDArray[np.float64]:
+    def _scores(self, trajectory: Trajectory, duration: float) -> npt.NDArray[np.float64]:
         """``(T, G)`` mean log-density of the samples so far, after each sample."""
-        check_dimension(walk, self.n_dims_)
-        if not walk.num_states:
+        check_dimension(trajectory, self.n_dims_)
+        if not trajectory.num_states:
             return np.zeros((0, len(self.goals_)))
-        reach = Reach(walk)
+        reach = Reach(trajectory)
         lows, highs = self._windows(reach.times, duration)
         return observe(
             reach.points,

@@ -31,8 +31,8 @@ def advance(
 ) -> int:
     """Take one more sample into an alignment that is open at the end of the reference.
 
-    Row by row, ``cost[k]`` is the cheapest way to match all samples so far to steps ``0..k``; ``total`` and ``weight``
-    add up a quantity (the log-density) along that way, older samples counting less by ``decay`` per sample. All three
+    Row by row, ``cost[k]`` is the least cost of matching all samples so far to steps ``0..k``; ``total`` and ``weight``
+    add up a quantity (the log-density) along that match, older samples counting less by ``decay`` per sample. All three
     are updated in place. The first sample is the origin of the reach, the same for every goal, and adds nothing.
 
     Args:

@@ -320,7 +320,7 @@ def test_score_judges_predictors_and_reports_them(run: Path, walks_of_run: Path)
     page, report = (folder / "report.html").read_text(), (run / "report.html").read_text()
     for text in (page, report):
         assert text.count("data:image/svg+xml;base64,") == 3
-        assert "People, read by predictors" in text
+        assert "Goal prediction" in text
         assert "http://" not in text.replace("http://www.w3.org", "")
     assert legible("report", run).exit_code == 0
     assert (run / "report.html").read_text() == report
@@ -337,17 +337,17 @@ def test_files_of_a_reading_cannot_run_anything(run: Path, walks_of_run: Path, t
     )
     assert result.exit_code == 0, result.output
     assert not (out / "learning_curve.svg").exists()
-    from benchmarks.reports.prediction_report import reading_section
+    from benchmarks.reports.prediction_report import evaluation_section
 
     (out / "accuracy.svg").write_text("<svg><script>alert(1)</script></svg>")
     text = (out / "reading.json").read_text().replace('"notes": []', '"notes": ["<script>alert(1)</script>"]')
     (out / "reading.json").write_text(text)
-    section = reading_section(out)
+    section = evaluation_section(out)
     assert section is not None
     assert "&lt;script&gt;" in section
     assert "<script" not in section
     (out / "reading.json").write_text("{")
-    assert reading_section(out) is None
+    assert evaluation_section(out) is None
 
 
 @pytest.mark.parametrize(

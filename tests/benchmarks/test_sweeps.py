@@ -58,7 +58,7 @@ def test_every_combination_is_one_cell() -> None:
         ({"predictors": ["bayesian"], "people": {"walker": "nobody"}}, "people of .*walker must be one of"),
         (
             {"workspaces": ["overcooked", "tabletop"], "predictors": ["bayesian"]},
-            "'bayesian', people of workspace 'tabletop' .*reads walks in kitchens",
+            "'bayesian', people of workspace 'tabletop' .*is for trajectories in kitchens",
         ),
     ],
 )

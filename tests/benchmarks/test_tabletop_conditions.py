@@ -33,9 +33,7 @@ from benchmarks.experiments.trial_rows import (
     make_judge,
 )
 from benchmarks.reports.experiment_report import Section
-from legible_envs.rollouts import Trajectory
 from legible_envs.tabletop import TabletopLayout, TabletopTask, TabletopWorkspace
-from predictors.base import NoReader
 
 SMALL = Settings(
     layouts=2,
@@ -147,12 +145,6 @@ def test_reaches_behind_covariances_are_balanced_and_rows_are_their_moments() ->
     last = rows[(rows["alignment"] == "none") & (rows["goal"] == goal)].iloc[-1]
     assert (last["x"], last["y"]) == pytest.approx(ends.mean(axis=0))
     assert [[last["xx"], last["xy"]], [last["xy"], last["yy"]]] == pytest.approx(np.cov(ends.T), abs=1e-12)
-
-
-def test_who_reads_nothing_never_knows() -> None:
-    context = Trajectory(np.zeros((1, 2)), candidates=("a", "b", "c", "d"))
-    belief = NoReader().stream(context)
-    assert belief.update((0.3, 0.4), 0.2) == dict.fromkeys("abcd", 0.25)
 
 
 def test_a_robot_that_reads_is_sure_earlier_than_one_that_does_not() -> None:

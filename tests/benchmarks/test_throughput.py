@@ -19,7 +19,7 @@ from benchmarks.throughput.measure import Figure, alternate, rate
 from benchmarks.throughput.peer_maxent_irl import tasks
 from benchmarks.throughput.peer_tabletop import stages_of, straight_line_loss, straight_line_losses
 from benchmarks.throughput.peers import IMITATION, IRL_MAXENT, OVERCOOKED_AI, Peer, PeerError, open_peer, opened
-from benchmarks.throughput.predictors_grid import noisy_walks, reading, save_problem
+from benchmarks.throughput.predictors_grid import noisy_trajectories, prediction_speed, save_problem
 from benchmarks.throughput.sweep import OPTIMUM_5X5, TARGETS, Settings, Target
 from benchmarks.throughput.tabletop import _episodes, replay, tables_with
 from legible_envs.tabletop import TabletopTask
@@ -34,7 +34,7 @@ TINY = Settings(
     search_evaluations=3_000,
     num_envs=2,
     fresh_starts=1,
-    walks=60,
+    trajectories=60,
     evaluations=1,
     tables=8,
     table_climbs=(20, 2),
@@ -214,7 +214,7 @@ def expected_visits(moves: Any, starts: Any, reward: Any) -> Any:
 def test_other_packages_are_given_the_same_problem(tmp_path: Path) -> None:
     from predictors.grid.walk_likelihood import collect_evidence
 
-    (evidence,) = collect_evidence(noisy_walks(200, np.random.default_rng(0))).values()
+    (evidence,) = collect_evidence(noisy_trajectories(200, np.random.default_rng(0))).values()
     with np.load(save_problem(tmp_path)) as problem:
         expected = sum(expected_visits(*task) for task in tasks(problem))
         _, gradient = evidence.loss(-problem["rewards"])
@@ -243,7 +243,7 @@ def test_other_packages_are_measured_if_they_agree(
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     peer = Peer(Path(sys.executable), IRL_MAXENT, ("irl-maxent", str(save_problem(tmp_path))))
     remarks: list[str] = []
-    figures = {figure.key: figure for figure in reading(TINY, {"irl-maxent": peer}, remarks)}
+    figures = {figure.key: figure for figure in prediction_speed(TINY, {"irl-maxent": peer}, remarks)}
     peer.close()
     assert ("irl-maxent" in figures) == right
     assert bool(remarks) != right

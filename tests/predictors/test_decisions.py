@@ -1,10 +1,9 @@
-"""Watching one person: every registered predictor, and the rule that says when to act."""
+"""The rule that says when to act on a prediction."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,131 +17,10 @@ from predictors import (
     GoalPredictor,
     ShortestDistance,
     ThresholdDecision,
-    list_predictors,
-    make_predictor,
 )
-from predictors.checks import example_walks
+from predictors.checks import example_trajectories
 from predictors.evaluation.decisions import Decision, summarise_decisions
-
-BUILT_IN = sorted(name for name, info in list_predictors().items() if info.origin == "built in")
-QUICK: dict[str, dict[str, Any]] = {
-    "recurrent": {"hidden_size": 8, "members": 2, "max_epochs": 3},
-    "transformer": {"width": 8, "members": 2, "max_epochs": 3},
-}
-CORNERS = {"left": (-0.3, 0.4), "middle": (0.0, 0.5), "right": (0.3, 0.4)}
-
-
-def reaches() -> list[Trajectory]:
-    """Reaches to three places, some with only two of them possible."""
-    rng = np.random.default_rng(0)
-    found = []
-    for number in range(24):
-        names = ("right", "left") if number % 4 == 0 else tuple(CORNERS)
-        goal = names[number % len(names)]
-        way = np.linspace(0, 1, int(rng.integers(6, 10)))[:, None]
-        points = way * np.array(CORNERS[goal]) + np.cumsum(rng.normal(0, 0.004, (len(way), 2)), axis=0)
-        points = points - points[0]
-        found.append(
-            Trajectory(
-                points,
-                np.arange(len(points)) / 30,
-                goal=goal,
-                candidates=names,
-                participant=f"p{number % 4}",
-                goal_positions=tuple(CORNERS[name] for name in names),
-            )
-        )
-    return found
-
-
-def fitted(name: str) -> tuple[GoalPredictor, list[Trajectory]]:
-    """A predictor fitted to what it can read: walks in a kitchen, or else reaches."""
-    if name not in _FITTED:
-        pytest.importorskip("torch") if name in QUICK else None
-        for walks in (example_walks(), reaches()):
-            predictor = make_predictor(name, **QUICK.get(name, {}))
-            try:
-                predictor.fit(walks)
-                predictor.predict_proba(walks)
-            except (ValueError, TypeError):
-                continue
-            _FITTED[name] = (predictor, walks)
-            break
-        else:
-            raise AssertionError(f"{name} reads neither walks nor reaches")
-    return _FITTED[name]
-
-
-_FITTED: dict[str, tuple[GoalPredictor, list[Trajectory]]] = {}
-
-
-# -- every predictor ---------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", BUILT_IN)
-def test_a_stream_says_what_prefixes_say(name: str) -> None:
-    predictor, walks = fitted(name)
-    for walk in walks[:6]:
-        stream = predictor.stream(walk)
-        rows = predictor.predict_proba([walk.first(count) for count in range(walk.num_states + 1)])
-        beliefs = [stream.belief] + [
-            stream.update(state, float(time)) for state, time in zip(walk.states, walk.times, strict=True)
-        ]
-        columns = [predictor.classes_.tolist().index(goal) for goal in walk.candidates]
-        np.testing.assert_allclose([list(belief.values()) for belief in beliefs], rows[:, columns], atol=1e-9)
-        assert all(tuple(belief) == walk.candidates for belief in beliefs)
-        assert (stream.num_states, stream.last_time) == (walk.num_states, walk.times[-1])
-
-
-@pytest.mark.parametrize("name", BUILT_IN)
-def test_the_future_changes_nothing(name: str) -> None:
-    """The belief after t states is the same whatever comes after them, goal and whole length included."""
-    predictor, walks = fitted(name)
-    for walk in walks[:6]:
-        half = walk.num_states // 2
-        back = np.concatenate([walk.states[:half], walk.states[:half][::-1]])
-        other = Trajectory(
-            back,
-            start=walk.start,
-            candidates=walk.candidates,
-            layout=walk.layout,
-            goal_positions=walk.goal_positions,
-            complete=False,
-        )
-        timed = Trajectory(
-            walk.states,
-            start=walk.start,
-            candidates=walk.candidates,
-            layout=walk.layout,
-            goal_positions=walk.goal_positions,
-            complete=False,
-        )
-        for count in range(half + 1):
-            expected = predictor.predict_proba([timed.first(count)])
-            np.testing.assert_allclose(predictor.predict_proba([other.first(count)]), expected, atol=1e-12)
-
-
-@pytest.mark.parametrize("name", BUILT_IN)
-def test_only_candidates_are_possible(name: str) -> None:
-    predictor, walks = fitted(name)
-    few = [walk for walk in walks if len(walk.candidates) < len(predictor.classes_)]
-    assert few
-    prefixes = [walk.first(count) for walk in few for count in range(walk.num_states + 1)]
-    rows = predictor.predict_proba(prefixes)
-    assert np.allclose(rows.sum(axis=1), 1)
-    for row, prefix in zip(rows, prefixes, strict=True):
-        assert {goal for goal, p in zip(predictor.classes_, row, strict=True) if p > 0} <= set(prefix.candidates)
-
-
-@pytest.mark.parametrize("name", BUILT_IN)
-def test_nothing_observed_is_a_prior_that_the_start_and_states_do_not_change(name: str) -> None:
-    predictor, walks = fitted(name)
-    by_candidates: dict[frozenset[str], dict[str, float]] = {}
-    for walk in walks:
-        row = dict(zip(predictor.classes_.tolist(), predictor.predict_proba([walk.first(0)])[0], strict=True))
-        assert row == pytest.approx(by_candidates.setdefault(frozenset(walk.candidates), row), abs=1e-12)
-        assert predictor.stream(walk).belief == pytest.approx({goal: row[goal] for goal in walk.candidates})
-
+from tests.predictors.cases import Case
 
 # -- when to act -------------------------------------------------------------------------------------------------------
 
@@ -154,7 +32,7 @@ class Scripted(GoalPredictor):
         rows = np.zeros((len(X), len(self.classes_)))
         for row, walk in zip(rows, X, strict=True):
             first = walk.states[-1, 0] if walk.num_states else 0.5
-            row[self._columns(walk)] = first, 1 - first
+            row[self.candidate_columns(walk)] = first, 1 - first
         return rows
 
 
@@ -231,9 +109,8 @@ def test_whole_trajectories_are_streams(values: list[float], threshold: float, p
         assert found == (*[getattr(watcher.decision, f) for f in ("goal", "probability", "step", "time")],)
 
 
-@pytest.mark.parametrize("name", BUILT_IN)
-def test_every_predictor_can_decide(name: str) -> None:
-    predictor, walks = fitted(name)
+def test_every_predictor_can_decide(case: Case, predictor: GoalPredictor) -> None:
+    walks = case.test
     thresholds = [0.4, 0.6, 0.9, 1.0]
     rows = ThresholdDecision(predictor).trade_off(walks, thresholds)
     assert len(rows) == len(walks) * len(thresholds)
@@ -250,7 +127,7 @@ def test_every_predictor_can_decide(name: str) -> None:
 
 
 def test_standing_still_is_no_evidence_for_patience() -> None:
-    walk = example_walks()[0]
+    walk = example_trajectories()[0]
     predictor = BayesianGoalPredictor(beta=5.0).fit([walk])
     watcher = ThresholdDecision(predictor, 0.9, patience=2).stream(walk)
     for cell in ((3, 2), (2, 2), (1, 2), (1, 1), (1, 1), (1, 1)):
@@ -259,7 +136,7 @@ def test_standing_still_is_no_evidence_for_patience() -> None:
 
 
 def test_bad_rules_and_points() -> None:
-    walk = example_walks()[0]
+    walk = example_trajectories()[0]
     predictor = ShortestDistance().fit([walk])
     for threshold in (0, 1.1, math.nan, True, "high"):
         with pytest.raises(ValueError, match="a threshold must be above 0 and at most 1"):

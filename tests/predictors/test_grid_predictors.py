@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections import Counter
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,9 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sklearn.base import clone
 
-from benchmarks.experiments.prediction import PREDICTORS, compare_with_reference, score_recorded_play
-from benchmarks.experiments.prediction.sweep import LAYOUTS, REFERENCE
-from legible_envs.datasets.overcooked_2019 import RecordingsError, recorded_trajectories
 from legible_envs.errors import LayoutError
 from legible_envs.overcooked import OvercookedLayout
 from legible_envs.rollouts import Trajectory
@@ -26,16 +21,12 @@ from predictors import (
     GridNeighbours,
     GridNGram,
     MaxEntIRL,
-    check_predictor,
-    make_predictor,
 )
-from predictors.checks import example_walks
 from predictors.grid.graphs import walk_graph
 from predictors.grid.nearest_kernels import votes_of_nearest
 from predictors.grid.priors import GoalPrior
+from tests.predictors.cases import KITCHEN_CASES, ROOM, THREE, Case, fitted, people, prefixes, walk
 
-ROOM = OvercookedLayout.from_ascii("XOXTX\nX   X\nX V D\nX   X\nXXSPX")
-THREE = ("onion", "tomato", "dish")
 LEARNERS: list[GoalPredictor] = [
     MaxEntIRL(),
     MaxEntIRL(prior="empirical"),
@@ -45,7 +36,7 @@ LEARNERS: list[GoalPredictor] = [
     GridNeighbours(k=3),
     GridNGram(),
 ]
-EQ_1: list[GoalPredictor] = [
+BAYESIAN: list[GoalPredictor] = [
     BayesianGoalPredictor(beta=2.0),
     BayesianGoalPredictor(costs="soft"),
     BayesianGoalPredictor("fit", costs="soft"),
@@ -57,53 +48,14 @@ EQ_1: list[GoalPredictor] = [
 UNSEEN_LAYOUT = OvercookedLayout.from_ascii("XOXTX\nX   X\nX   D\nXV  X\nXXSPX")
 
 
-def walk(cells: Any, goal: str | None = "onion", candidates: tuple[str, ...] = THREE, **more: Any) -> Trajectory:
-    return Trajectory(np.array(cells), goal=goal, candidates=candidates, **{"layout": ROOM, "start": "serving", **more})
-
-
-def people() -> list[Trajectory]:
-    """Walks in ROOM: most to the onions."""
-    ways = {
-        "onion": [(3, 2), (3, 1), (2, 1), (1, 1), (0, 1)],
-        "tomato": [(3, 2), (3, 3), (2, 3), (1, 3), (0, 3)],
-        "dish": [(3, 2), (3, 3), (2, 3), (2, 4)],
-    }
-    return [walk(ways[goal], goal) for goal in ("onion",) * 6 + ("tomato",) * 3 + ("dish",) * 2]
-
-
-def prefixes(walks: list[Trajectory]) -> list[Trajectory]:
-    return [w.first(t) for w in walks for t in range(w.num_states + 1)]
-
-
 # -- the contract -----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("predictor", [*LEARNERS, *EQ_1[:3]], ids=repr)
-def test_ours_keep_the_contract(predictor: GoalPredictor) -> None:
-    check_predictor(predictor)
-    check_predictor(predictor, people())
-
-
-@pytest.mark.parametrize("predictor", LEARNERS, ids=repr)
-def test_a_stream_says_what_predict_proba_says(predictor: GoalPredictor) -> None:
-    walks = people()
-    fitted = clone(predictor).fit(walks)
-    back_and_forth = walk([(3, 2), (3, 3), (2, 3), (3, 3), (3, 2), (3, 1)], None, complete=False)
-    for found in (walks[0], walks[-1], back_and_forth):
-        stream = fitted.stream(found)
-        columns = [fitted.classes_.tolist().index(name) for name in found.candidates]
-        assert list(stream.belief.values()) == fitted.predict_proba([found.first(0)])[0, columns].tolist()
-        for count, cell in enumerate(found.states, 1):
-            belief = stream.update(cell)
-            assert list(belief.values()) == fitted.predict_proba([found.first(count)])[0, columns].tolist()
-
-
-@pytest.mark.parametrize("predictor", LEARNERS, ids=repr)
-def test_whoever_is_inside_a_station_has_arrived(predictor: GoalPredictor) -> None:
-    walks = people()
-    fitted = clone(predictor).fit(walks)
-    assert fitted.predict(walks).tolist() == [w.goal for w in walks]
-    assert (fitted.predict_proba(walks).max(axis=1) == 1.0).all()
+@pytest.mark.parametrize("case", KITCHEN_CASES, ids=str)
+def test_inside_a_station_the_goal_is_certain(case: Case) -> None:
+    walks = [*people(), *case.test]
+    assert fitted(case).predict(walks).tolist() == [w.goal for w in walks]
+    assert (fitted(case).predict_proba(walks).max(axis=1) == 1.0).all()
 
 
 @pytest.mark.parametrize("predictor", LEARNERS, ids=repr)
@@ -125,7 +77,7 @@ def test_the_order_of_walks_and_names_of_people_mean_nothing(predictor: GoalPred
 def test_nothing_observed_is_the_prior_exactly() -> None:
     walks = people()
     nothing = [w.first(0) for w in walks]
-    for predictor in EQ_1:
+    for predictor in BAYESIAN:
         assert (clone(predictor).fit(walks).predict_proba(nothing) == 1 / 3).all()
     empirical = GoalPrior("empirical", walks, np.array(sorted(THREE))).of(sorted(THREE))
     assert empirical == pytest.approx([3 / 14, 7 / 14, 4 / 14])
@@ -133,11 +85,11 @@ def test_nothing_observed_is_the_prior_exactly() -> None:
         assert (clone(predictor).fit(walks).predict_proba(nothing) == empirical).all()
 
 
-def test_one_cell_is_the_prior_exactly_for_eq_1() -> None:
+def test_one_cell_is_the_prior_exactly_for_bayesian_inference() -> None:
     walks = people()
     cells = np.argwhere(ROOM.cells == 0)
     parts = [walk([cell], None, complete=False) for cell in cells]
-    for predictor in EQ_1:
+    for predictor in BAYESIAN:
         assert (clone(predictor).fit(walks).predict_proba(parts) == 1 / 3).all()
     with_prior = BayesianGoalPredictor(prior="empirical").fit(walks)
     assert with_prior.predict_proba(parts) == pytest.approx(np.tile([3 / 14, 7 / 14, 4 / 14], (len(parts), 1)))
@@ -154,7 +106,7 @@ def test_the_empirical_prior_counts_choices_where_they_could_be_made() -> None:
     assert GoalPrior("empirical", [unknown], np.array(sorted(THREE))).of(THREE) == pytest.approx([1 / 3] * 3)
 
 
-def test_eq_1_multiplies_its_prior_with_its_likelihood() -> None:
+def test_bayesian_inference_multiplies_its_prior_with_its_likelihood() -> None:
     walks = people()
     parts = [p for p in prefixes(walks) if p.num_states]
     for costs in ("hard", "soft"):
@@ -319,38 +271,44 @@ def test_a_goal_with_one_example_is_learned_from(predictor: GoalPredictor) -> No
     assert fitted.predict_proba([walks[-1].first(3)])[0, 0] > fitted.predict_proba([walks[0].first(3)])[0, 0]
 
 
-@pytest.mark.parametrize("predictor", LEARNERS, ids=repr)
-def test_bad_input_is_refused_in_words(predictor: GoalPredictor) -> None:
-    walks = people()
-    fitted = clone(predictor).fit(walks)
+@pytest.mark.parametrize("case", KITCHEN_CASES, ids=str)
+def test_states_that_do_not_fit_the_kitchen_are_refused_in_words(case: Case) -> None:
+    predictor = fitted(case)
     with pytest.raises(ValueError, match=r"unknown goals \['pot'\]"):
-        fitted.predict_proba([walk([(3, 3)], "pot", ("onion", "pot"))])
-    with pytest.raises(ValueError, match="state 1, row 2, column 2 is neither floor"):
-        fitted.predict_proba([walk([(1, 2), (2, 2), (3, 2)])])
-    with pytest.raises(ValueError, match="needs the layout"):
-        fitted.predict_proba([walk([(1, 1)], layout=None)])
+        predictor.predict_proba([walk([(3, 3)], "pot", ("onion", "pot"))])
+    for cells in ([(1, 1), (2, 2), (3, 3)], [(1, 2), (2, 2), (3, 2)]):
+        with pytest.raises(ValueError, match="state 1, row 2, column 2 is neither floor"):
+            predictor.predict_proba([walk(cells)])
+    with pytest.raises(ValueError, match="state 0, row 0, column 1"):
+        predictor.predict_proba([walk([(0, 1), (1, 1)])])
+    with pytest.raises(ValueError, match="state 0, row 9, column -4"):
+        predictor.predict_proba([walk([(9, -4)])])
     with pytest.raises(ValueError, match="cells"):
-        fitted.predict_proba([walk([(1.0, 1.0)])])
+        predictor.predict_proba([walk([(1.0, 1.0)])])
+    with pytest.raises(ValueError, match="needs the layout"):
+        predictor.predict_proba([walk([(1, 1)], layout=None)])
     bare = OvercookedLayout.from_ascii("XXXTX\nX   X\nX   D\nXXSPX")
     with pytest.raises((ValueError, LayoutError), match="onion"):
-        fitted.predict_proba([walk([(1, 1)], layout=bare)])
-    with pytest.raises(ValueError, match="at least one trajectory"):
-        clone(predictor).fit([])
+        predictor.predict_proba([walk([(1, 1)], layout=bare)])
+
+
+@pytest.mark.parametrize("predictor", LEARNERS, ids=repr)
+def test_learning_from_states_that_do_not_fit_is_refused_in_words(predictor: GoalPredictor) -> None:
+    walks = people()
     jump = walk([(3, 2), (1, 2), (1, 1), (0, 1)])
     wrong = walk([(3, 2), (2, 2), (1, 2), (1, 1), (0, 1)])
-    if "learned" in repr(predictor) or "fit" in repr(predictor) or not isinstance(predictor, BayesianGoalPredictor):
-        with pytest.raises(ValueError, match="row 3, column 2 to row 1, column 2"):
-            clone(predictor).fit([*walks, jump])
-        with pytest.raises(ValueError, match="complete walks with known goals"):
-            clone(predictor).fit([*walks, walks[0].first(2)])
-        with pytest.raises(ValueError, match="state 1, row 2, column 2"):
-            clone(predictor).fit([*walks, wrong])
+    with pytest.raises(ValueError, match="row 3, column 2 to row 1, column 2"):
+        clone(predictor).fit([*walks, jump])
+    with pytest.raises(ValueError, match="complete trajectories with known goals"):
+        clone(predictor).fit([*walks, walks[0].first(2)])
+    with pytest.raises(ValueError, match="state 1, row 2, column 2"):
+        clone(predictor).fit([*walks, wrong])
 
 
 def test_goals_out_of_reach_are_named() -> None:
     split = OvercookedLayout.from_ascii("XOXTX\nX X D\nX X X\nXXPXX")
     ways = [walk([(1, 1), (0, 1)], layout=split), walk([(2, 1), (1, 1), (0, 1)], layout=split)]
-    for predictor in (*EQ_1[:5], MaxEntIRL()):
+    for predictor in (*BAYESIAN[:5], MaxEntIRL()):
         fitted = clone(predictor).fit(ways)
         with pytest.raises(ValueError, match=r"'tomato' cannot be reached from row 1, column 1"):
             fitted.predict_proba([ways[0].first(1)])
@@ -378,54 +336,3 @@ def test_bad_parameters_are_refused() -> None:
     for costs, message in ((np.ones((2, 2)), r"shape \(5, 5\)"), (np.full((5, 5), np.nan), "row 1, column 1 is nan")):
         with pytest.raises(ValueError, match=message):
             BayesianGoalPredictor(cell_costs=costs).fit(walks).predict_proba([walks[0].first(2)])
-
-
-# -- recorded people --------------------------------------------------------------------------------------------------
-
-
-def have_recordings() -> bool:
-    try:
-        return bool(recorded_trajectories(None, ["cramped_room"]))
-    except RecordingsError:
-        return False
-
-
-needs_recordings = pytest.mark.skipif(not have_recordings(), reason="no recorded games: legible humans fetch")
-
-
-@pytest.mark.data
-@needs_recordings
-def test_beliefs_about_recorded_people_are_honest_before_they_move() -> None:
-    walks = recorded_trajectories(None, ["cramped_room"])[:120]
-    counts = Counter(w.goal for w in walks)
-    for predictor in LEARNERS[4:]:
-        fitted = clone(predictor).fit(walks)
-        row = fitted.predict_proba([walks[0].first(0)])[0]
-        expected = np.array([counts[name] + 1 for name in fitted.classes_.tolist()]) / (len(walks) + 3)
-        assert row == pytest.approx(expected)
-
-
-@pytest.mark.data
-@pytest.mark.slow
-@needs_recordings
-def test_recorded_people_are_read_as_well_as_measured_before() -> None:
-    table = compare_with_reference(score_recorded_play())
-    assert len(table) == len(LAYOUTS) * len(PREDICTORS)
-    known = table.dropna(subset=["reference"])
-    assert len(known) == len(LAYOUTS) * len(REFERENCE.keys() & {setting.label for setting in PREDICTORS})
-    for row in known.itertuples():
-        assert row.difference > -0.02, row
-    fixed = known[known["predictor"].isin(["shortest distance", "Eq. 1", "Eq. 1 (soft costs)", "MaxEnt IRL"])]
-    assert fixed["difference"].abs().max() < 0.003
-
-
-def test_they_are_known_by_name() -> None:
-    names = {
-        "maxent-irl": MaxEntIRL,
-        "grid-logistic": GridLogistic,
-        "grid-knn": GridNeighbours,
-        "grid-ngram": GridNGram,
-    }
-    for name, kind in names.items():
-        assert type(make_predictor(name)) is kind
-    assert len(example_walks()) == 8

@@ -15,8 +15,8 @@ from sklearn.base import clone
 from legible_envs.overcooked import OvercookedLayout
 from legible_envs.rollouts import Trajectory
 from predictors import BayesianGoalPredictor, MaxEntIRL, check_predictor
-from predictors.checks import example_walks
-from predictors.grid.graphs import optimal_costs, soft_costs, walk_graph
+from predictors.checks import example_trajectories
+from predictors.grid.graphs import soft_costs, station_costs, walk_graph
 from predictors.grid.walk_kernels import factorise, solve, solve_transposed
 from predictors.grid.walk_likelihood import MOST_RATIONAL, best_uniform_cost, collect_evidence
 
@@ -136,7 +136,7 @@ def test_costs_are_those_of_log_sum_exp_value_iteration(
 ) -> None:
     layout, goals = found
     costs = random_costs(layout, seed)
-    soft, hard = soft_costs(layout, goals, costs), optimal_costs(layout, goals, costs)
+    soft, hard = soft_costs(layout, goals, costs), station_costs(layout, goals, costs)
     steps, ends = dense(layout, goals, costs)
     with np.errstate(divide="ignore"):
         steps, ends = np.log(steps), np.log(ends)
@@ -188,7 +188,7 @@ def test_nothing_underflows_however_far() -> None:
 def test_costs_below_zero_are_fine_while_no_round_trip_pays() -> None:
     costs = np.full(ROOM.shape, 3.0)
     costs[1, 1] = costs[3, 3] = -1.0
-    hard, soft = optimal_costs(ROOM, GOALS, costs), soft_costs(ROOM, GOALS, costs)
+    hard, soft = station_costs(ROOM, GOALS, costs), soft_costs(ROOM, GOALS, costs)
     assert hard[2, 1, 0] == -1.0  # one step up, beside the onions
     assert np.isfinite(soft[1, 1]).all()
 
@@ -307,7 +307,7 @@ def test_the_best_uniform_cost_is_best() -> None:
     assert loss(best) < min(loss(best - 1e-3), loss(best + 1e-3))
     assert best == pytest.approx(1.7, abs=0.08)
     assert BayesianGoalPredictor("fit", costs="soft").fit(walks).beta_ == best
-    straight = [w for w in example_walks() if len(w.states) <= 5][:1]
+    straight = [w for w in example_trajectories() if len(w.states) <= 5][:1]
     assert best_uniform_cost(collect_evidence(straight)) == MOST_RATIONAL
 
 
@@ -367,7 +367,7 @@ def test_features_are_shared_by_kitchens() -> None:
     new = OvercookedLayout.from_ascii("XOXTX\nX   X\nXV  D\nX   X\nXXSPX")
     map_ = irl.cost_map(new)
     assert map_[3, 1] - map_[3, 3] == pytest.approx(weight)
-    with pytest.raises(ValueError, match="say which of the 2 kitchens"):
+    with pytest.raises(ValueError, match="one of the 2 kitchens"):
         irl.draw_reward()
     assert irl.draw_reward(new).dtype == np.uint8
     # One matrix serves all kitchens of a shape. Positions written out say what "position" says, but for the level.
@@ -380,7 +380,7 @@ def test_features_are_shared_by_kitchens() -> None:
 
 
 def test_a_kitchen_never_seen_has_the_uniform_cost() -> None:
-    walks = example_walks()
+    walks = example_trajectories()
     irl = MaxEntIRL().fit(walks)
     new = OvercookedLayout.from_ascii("XOXTX\nX   X\nX V D\nX   X\nXXSPX")
     assert irl.cost_map(new)[new.cells == 0] == pytest.approx(irl.uniform_cost_)
@@ -392,14 +392,14 @@ def test_a_kitchen_never_seen_has_the_uniform_cost() -> None:
 def test_it_keeps_the_contract_and_forgets_on_refitting() -> None:
     check_predictor(MaxEntIRL())
     check_predictor(MaxEntIRL(prior="empirical"))
-    irl = MaxEntIRL().fit(example_walks())
+    irl = MaxEntIRL().fit(example_trajectories())
     assert {name for name in vars(irl) if name.endswith("_")} >= {"cost_", "reward_", "costs_", "coef_", "classes_"}
     assert np.array_equal(irl.reward_, -irl.cost_, equal_nan=True)
     assert np.isnan(irl.cost_[0]).all()
     copy = pickle.loads(pickle.dumps(irl))
     assert np.array_equal(copy.cost_, irl.cost_, equal_nan=True)
     other = sample_walks(ROOM, random_costs(ROOM, 14), 20, np.random.default_rng(14))
-    irl.fit([*other, *example_walks()])
+    irl.fit([*other, *example_trajectories()])
     assert not hasattr(irl, "cost_")
     assert len(irl.costs_) == 2
     assert clone(irl).get_params()["l2"] == irl.l2
@@ -421,7 +421,7 @@ def test_the_reward_is_drawn_where_people_walk() -> None:
 
 
 def test_bad_walks_and_parameters_are_refused_in_words() -> None:
-    good = example_walks()
+    good = example_trajectories()
     one = good[0]
 
     def changed(cells: Any, goal: str | None = "onion", **more: Any) -> Trajectory:
@@ -429,8 +429,8 @@ def test_bad_walks_and_parameters_are_refused_in_words() -> None:
 
     cases = [
         (changed([(3, 2), (1, 2), (1, 1), (0, 1)]), "row 3, column 2 to row 1, column 2, which is not one step"),
-        (changed([(3, 2), (2, 2)], None), "complete walks with known goals"),
-        (changed([(3, 2), (2, 2)], complete=False), "complete walks with known goals"),
+        (changed([(3, 2), (2, 2)], None), "complete trajectories with known goals"),
+        (changed([(3, 2), (2, 2)], complete=False), "complete trajectories with known goals"),
         (changed([(3, 2), (2, 2)]), "ends with the cell of its goal station"),
         (changed([(0, 1)]), "after one floor cell or more"),
         (changed([(3, 2), (4, 2), (0, 1)]), "state 1, row 4, column 2 is neither floor"),

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import pickle
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
-from sklearn.exceptions import NotFittedError
+from sklearn.base import clone
 
 from legible_envs.rollouts import Trajectory, load_trajectories, save_trajectories
 from predictors import (
@@ -18,66 +17,20 @@ from predictors import (
     ShortestDistance,
     StraightLineBayesian,
     TimeSeriesGaussian,
-    check_predictor,
     make_predictor,
 )
 from predictors.reaching.ellipses import draw_reaches, ellipse_table, spread_table
 from predictors.reaching.features import Reach, resample
+from tests.predictors.cases import NAMES, PLACES, POSITIONS, REACH_CASES, Case, fitted, reaches
 from tests.support.pointing import grouped_accuracy, load_pointing, needs_pointing
 
-PLACES = {"left": (-0.25, 0.3), "middle": (0.0, 0.4), "right": (0.25, 0.3)}
-NAMES = tuple(PLACES)
-POSITIONS = tuple(PLACES.values())
-
-
-def reach(goal: str, rng: np.random.Generator, *, positions: bool = True, **more: Any) -> Trajectory:
-    """A minimum-jerk reach with bow and noise, from a place that differs every time, at irregular times."""
-    duration = rng.lognormal(0.0, 0.15)
-    times = np.r_[0.0, np.sort(rng.uniform(0, duration, rng.integers(18, 32))), duration]
-    share = times / duration
-    progress = 10 * share**3 - 15 * share**4 + 6 * share**5
-    end = np.array(PLACES[goal]) + rng.normal(0, 0.015, 2)
-    bow = rng.normal(-0.1, 0.03) * np.sin(np.pi * progress)[:, None] * np.array([-end[1], end[0]])
-    start = rng.uniform(-0.5, 0.5, 2) if not positions else np.zeros(2)
-    options: dict[str, Any] = {"candidates": NAMES, "participant": f"p{rng.integers(6)}"}
-    if positions:
-        options["goal_positions"] = POSITIONS
-    return Trajectory(start + progress[:, None] * end + bow, times + 3.0, goal=goal, **{**options, **more})
-
-
-def reaches(count: int = 12, seed: int = 0, **more: Any) -> list[Trajectory]:
-    rng = np.random.default_rng(seed)
-    return [reach(goal, rng, **more) for _ in range(count) for goal in NAMES]
-
-
 TRAIN, TEST = reaches(), reaches(5, seed=1)
-GAUSSIANS = [
-    TimeSeriesGaussian(online=online, alignment=alignment, **options)
-    for online, alignment, options in (
-        ("open-end", "none", {}),
-        ("open-end", "dba", {"velocity": True, "n_samples": 20, "band": 0.1}),
-        ("open-end", "mean", {"band": None, "half_life": 0.1}),
-        ("open-end", "medoid", {"band": 0.0}),
-        ("index", "none", {"velocity": True, "half_life": 0}),
-        ("index", "medoid", {}),
-    )
-]
-BLIND = [ShortestDistance("euclidean"), StraightLineBayesian()]
-TRAINED = [ReachLogistic(), ReachNeighbours()]
-EVERY: list[GoalPredictor] = [*GAUSSIANS, *BLIND, *TRAINED]
-every = pytest.mark.parametrize("predictor", EVERY, ids=lambda p: repr(p)[:60])
+every = pytest.mark.parametrize("case", REACH_CASES, ids=str)
 
 
 @every
-def test_keeps_the_contract_of_predictors(predictor: GoalPredictor) -> None:
-    check_predictor(predictor, TRAIN[:12])
-    twin = pickle.loads(pickle.dumps(predictor.fit(TRAIN)))
-    assert np.array_equal(twin.predict_proba(TEST), predictor.predict_proba(TEST))
-
-
-@every
-def test_reads_people_better_the_more_it_sees(predictor: GoalPredictor) -> None:
-    predictor.fit(TRAIN)
+def test_more_of_a_reach_is_predicted_better(case: Case) -> None:
+    predictor = fitted(case)
     early, late = (predictor.score(TEST, fractions=(f,)) for f in (0.1, 0.9))
     assert late == pytest.approx(1.0)
     assert early < late
@@ -85,36 +38,8 @@ def test_reads_people_better_the_more_it_sees(predictor: GoalPredictor) -> None:
 
 
 @every
-def test_nothing_or_one_position_observed_is_the_prior(predictor: GoalPredictor) -> None:
-    walks = reaches(6, seed=2, positions=predictor in BLIND)
-    predictor.fit(walks)
-    third = np.full((len(walks), 3), 1 / 3)
-    assert np.array_equal(predictor.predict_proba([walk.first(0) for walk in walks]), third)
-    if not isinstance(predictor, ShortestDistance):
-        assert np.array_equal(predictor.predict_proba([walk.first(1) for walk in walks]), third)
-
-
-@every
-def test_prefixes_streams_and_fractions_agree(predictor: GoalPredictor) -> None:
-    predictor.fit(TRAIN)
-    for walk in TEST[:4]:
-        stream = predictor.stream(walk)
-        order = [list(predictor.classes_).index(name) for name in walk.candidates]
-        for count in range(walk.num_states + 1):
-            if count:
-                stream.update(walk.states[count - 1], walk.times[count - 1])
-            row = predictor.predict_proba([walk.first(count)])[0]
-            assert list(stream.belief) == list(walk.candidates)
-            assert list(stream.belief.values()) == pytest.approx(row[order], abs=1e-12)
-    at = predictor.predict_proba_at(TEST, (0.2, 0.7), "arc")
-    for walk, rows in zip(TEST, at, strict=True):
-        alone = predictor.predict_proba([walk.prefix(0.2, "arc"), walk.prefix(0.7, "arc")])
-        assert rows == pytest.approx(alone, abs=1e-12)
-
-
-@every
-def test_only_candidates_get_probability_and_their_order_does_not_matter(predictor: GoalPredictor) -> None:
-    predictor.fit(TRAIN)
+def test_candidates_may_be_fewer_and_in_another_order(case: Case) -> None:
+    predictor = fitted(case)
     walk = TEST[0]
     two = ("right", "left")
     places = tuple(PLACES[name] for name in two)
@@ -129,42 +54,23 @@ def test_only_candidates_get_probability_and_their_order_does_not_matter(predict
 
 @every
 @pytest.mark.parametrize("walks", [TRAIN[:3], [TRAIN[0]]], ids=["one reach to every goal", "one reach at all"])
-def test_goals_with_one_example_are_learned_from(predictor: GoalPredictor, walks: list[Trajectory]) -> None:
-    predictor.fit(walks)
+def test_goals_with_one_example_are_learned_from(case: Case, walks: list[Trajectory]) -> None:
+    predictor = clone(case.predictor).fit(walks)
     rows = predictor.predict_proba_at(walks)
     assert np.isfinite(rows).all()
     assert rows.sum(axis=2) == pytest.approx(1.0)
-    if predictor not in TRAINED:
+    if not isinstance(predictor, ReachLogistic | ReachNeighbours):
         assert predictor.predict(walks).tolist() == [walk.goal for walk in walks]
 
 
 @every
-def test_refuses_what_it_cannot_read(predictor: GoalPredictor) -> None:
-    with pytest.raises(NotFittedError):
-        type(predictor)().predict_proba(TEST)
-    predictor.fit(TRAIN)
-    stranger = Trajectory(np.zeros((3, 2)), candidates=("left", "ceiling"))
-    with pytest.raises(ValueError, match=r"unknown goals \['ceiling'\]"):
-        predictor.predict_proba([stranger])
+def test_states_of_another_dimension_are_refused(case: Case) -> None:
+    predictor = fitted(case)
     solid = Trajectory(np.arange(9.0).reshape(3, 3), candidates=NAMES, goal="left")
     with pytest.raises(ValueError, match="dimension 2 as in `fit`, got 3"):
         predictor.predict_proba([solid])
     with pytest.raises(ValueError, match="dimension"):
-        predictor.fit([*TRAIN, solid])
-    with pytest.raises(ValueError, match="at least one trajectory"):
-        predictor.fit([])
-    predictor.fit(TRAIN)
-    stream = predictor.stream(TEST[0])
-    stream.update((0.0, 0.0), 1.0)
-    for bad, when in (((np.nan, 0.0), 2.0), ((0.0, 0.0, 0.0), 2.0), ((0.0, 0.0), 0.5)):
-        before = stream.belief
-        with pytest.raises(ValueError, match=r"finite|dimension|backwards"):
-            stream.update(bad, when)
-        assert stream.belief == before
-
-
-def test_squares_and_products_are_a_predictor_too() -> None:
-    check_predictor(ReachLogistic(degree=2), TRAIN[:12])
+        clone(predictor).fit([*TRAIN, solid])
 
 
 def test_positions_must_be_finite() -> None:

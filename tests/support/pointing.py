@@ -38,10 +38,10 @@ def load_pointing() -> tuple[Trajectory, ...]:
 
 
 def grouped_accuracy(predictor: GoalPredictor, folds: int = 4) -> float:
-    """Mean accuracy over 10..90 % of movements by people whom the predictor has not seen."""
-    walks = np.array(load_pointing(), dtype=object)
-    people = [walk.participant for walk in walks]
-    scores = np.zeros(len(walks))
-    for train, test in GroupKFold(folds).split(walks, groups=people):
-        scores[test] = predictor.fit(list(walks[train])).score(list(walks[test]))
+    """Mean accuracy over 10..90 % of movements by participants that the predictor has not seen."""
+    movements = np.array(load_pointing(), dtype=object)
+    participants = [movement.participant for movement in movements]
+    scores = np.zeros(len(movements))
+    for train, test in GroupKFold(folds).split(movements, groups=participants):
+        scores[test] = predictor.fit(list(movements[train])).score(list(movements[test]))
     return float(scores.mean())

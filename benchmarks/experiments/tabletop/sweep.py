@@ -78,7 +78,7 @@ class Reader:
 READERS: Final = (
     Reader("Eq. 1", "eq1"),
     Reader("Gaussian", "predictors.reaching.gaussian:TimeSeriesGaussian"),
-    Reader("reads nothing", "predictors.base:NoReader"),
+    Reader("reads nothing", "predictors.uniform:UniformPredictor"),
     Reader("alone", ""),
 )
 """The Gaussian has learned from simulated people at the very table. Who reads nothing acts when the person holds

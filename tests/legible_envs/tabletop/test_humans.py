@@ -425,7 +425,7 @@ def test_eq_1_is_finite_inside_obstacles_and_follows_moved_objects() -> None:
 def test_kitchen_predictors_do_not_read_tables() -> None:
     reach = Trajectory([(1, 1), (2, 2)], goal="cup", candidates=("cup",), layout=detour())
     for predictor in (BayesianGoalPredictor(), ShortestDistance("geodesic")):
-        with pytest.raises(ValueError, match="reads walks in kitchens; this trajectory has a TabletopLayout"):
+        with pytest.raises(ValueError, match="is for trajectories in kitchens; this one has a TabletopLayout"):
             predictor.fit([reach]).predict_proba([reach])
 
 

@@ -15,7 +15,7 @@ from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.rollouts import CUTS, Trajectory
 from predictors import ShortestDistance
 from predictors.base import GoalPredictor
-from predictors.checks import example_walks
+from predictors.checks import example_trajectories
 from predictors.evaluation import accuracy_at, compare_conditions, evaluate, learning_curve
 from predictors.evaluation.metrics import calibration_error, clustered_interval, log_loss, tied_shares, weighted_scores
 from predictors.evaluation.splits import folds
@@ -391,7 +391,7 @@ def test_small_training_sets_must_have_heard_of_all_goals() -> None:
 
 
 def test_the_examples_of_the_contract_can_be_evaluated() -> None:
-    assert len(evaluate("bayesian", example_walks(), cv=2, repeats=1, rare="keep").table) == 8 * 9
+    assert len(evaluate("bayesian", example_trajectories(), cv=2, repeats=1, rare="keep").table) == 8 * 9
 
 
 @pytest.mark.data
