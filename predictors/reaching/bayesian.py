@@ -26,7 +26,7 @@ class StraightLineBayesian(PlacePredictor):
     where reaches ended in ``fit``. Over a :class:`~legible_envs.tabletop.TabletopLayout` it is the shortest path among
     the obstacles to the object of that name: a hand inside an obstacle counts as being at the nearest free point, and
     where there is no way the straight line counts, so that every cost is finite. This is the belief of
-    :class:`~legible_envs.tabletop.partner.belief.EqOneBelief`.
+    :class:`~legible_envs.tabletop.partner.belief.GoalBelief`.
 
     Args:
         beta: Rationality, per metre. Which goal is on top does not depend on it.
@@ -65,12 +65,12 @@ class StraightLineBayesian(PlacePredictor):
         """
         if not self.obstacles or not isinstance(walk.layout, TabletopLayout):
             return super().weigh_walk(walk)
-        from legible_envs.tabletop.partner.belief import EqOneBelief
+        from legible_envs.tabletop.partner.belief import GoalBelief
 
         self._check_beta()
         if walk.is_grid or walk.states.shape[1] != 2:
             raise ValueError(f"expected positions (x, y) on a table, got {walk.states.shape[1]}-d {walk.states.dtype}")
-        belief = EqOneBelief(
+        belief = GoalBelief(
             walk.layout, self.beta, start=walk.states[0], goals=walk.candidates, positions=walk.goal_positions
         )
         return np.array(list(belief.update(walk.states[-1]).values()))

@@ -1,15 +1,20 @@
-"""What a robot partner is told and what it answers; any object that takes the one and returns the other can be one."""
+"""What partners and predictors are told and what they answer: any object with these methods can take part."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Command", "Floats", "Senses", "State"]
+if TYPE_CHECKING:
+    from legible_envs.rollouts.trajectory import Trajectory
+    from legible_envs.tabletop.layout import TabletopLayout
+    from legible_envs.tabletop.task import TabletopTask
+
+__all__ = ["Command", "Floats", "GoalStream", "Partner", "PrefixPredictor", "Senses", "State", "StreamingPredictor"]
 
 Floats = npt.NDArray[np.float64]
 State = Literal["wait", "approach", "grasp", "carry", "place"]
@@ -17,7 +22,7 @@ State = Literal["wait", "approach", "grasp", "carry", "place"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Senses:
-    """What a robot knows when it is asked. Points are in metres, as in a layout; arrays are not to be written to.
+    """What a robot knows when it is asked. Points are in metres, as in a layout; arrays must not be written to.
 
     A *reach* begins when the person sets out with an empty hand and ends when they hold an object. While they hold
     one, ``reach``, ``times`` and ``start`` stay those of the reach that ended.
@@ -57,7 +62,7 @@ class Command:
 
     Attributes:
         velocity: ``(2,)`` of the gripper in m/s.
-        grasp: Object to close the gripper on now; it is within reach unless someone moved it. The next senses tell by
+        grasp: Object to close the gripper on now; it is within reach unless it was moved. The next senses tell by
             ``holding`` whether it was caught.
         release: Whether to open the gripper now; what it held stays at its place in the configuration, if the gripper
             is there, else where it is dropped.
@@ -78,3 +83,40 @@ class Command:
     predicted: str | None = None
     state: State = "wait"
     conflict: bool = False
+
+
+class Partner(Protocol):
+    """A robot that shares the table."""
+
+    def reset(self, layout: TabletopLayout, task: TabletopTask, rng: np.random.Generator) -> npt.ArrayLike | None:
+        """Begin an episode; ``(2,)`` where the gripper is, or None for the middle of the table's far side."""
+
+    def step(self, senses: Senses) -> Command:
+        """What to do until the next call."""
+        ...
+
+
+class GoalStream(Protocol):
+    """The belief about one reach while it happens."""
+
+    def update(self, point: Floats, time: float) -> Mapping[str, float]:
+        """Move the hand to ``(2,)`` at a time in seconds; ``{goal: probability}``."""
+        ...
+
+
+class StreamingPredictor(Protocol):
+    """A predictor that follows a reach point by point."""
+
+    def stream(self, context: Trajectory) -> GoalStream:
+        """Open a stream for one reach; ``context`` has its layout, candidates and their places, and no states."""
+        ...
+
+
+class PrefixPredictor(Protocol):
+    """A predictor of observed parts of trajectories."""
+
+    classes_: Sequence[str]
+
+    def predict_proba(self, X: Sequence[Trajectory]) -> Floats:
+        """``(len(X), len(classes_))`` probabilities."""
+        ...

@@ -1,4 +1,4 @@
-"""A robot that shares the table: it waits until it is sure what the person reaches for, then takes something else.
+"""A robot that shares the table: it waits until it is sure of the person's goal, then takes another object.
 
 An environment calls :meth:`RobotPartner.step` with what the robot senses, and carries out the command that comes back:
 it moves the gripper, closes it on an object within reach, and opens it again. Any object with these two methods can
@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from legible_envs.tabletop.objects import Point, point
-from legible_envs.tabletop.partner.intent import ReachWatcher
+from legible_envs.tabletop.partner.intent import IntentObserver
 from legible_envs.tabletop.partner.interface import Command, Floats, Senses, State
 from legible_envs.tabletop.partner.steering import Steering
 
@@ -29,10 +29,10 @@ _TIE: Final = 1e-9
 
 
 class RobotPartner:
-    """A robot arm that works with a person and stays out of their way.
+    """A robot arm that works with a person and keeps clear of their hand.
 
     It waits at home until it is *sure*: until one goal is more probable than ``threshold``, or the person holds an
-    object. Then it takes another one, of those it may validly take the nearest to its gripper and never the one the
+    object. Then it takes another one: the nearest to its gripper of those it may validly take, never the one the
     person goes for; puts it at its place in the task's configuration; and goes on while it is sure. Its states:
 
     =========  ==================================================  ====================================================
@@ -57,9 +57,9 @@ class RobotPartner:
     All of it is deterministic.
 
     Args:
-        predictor: Who reads the person: None for the built-in Eq. 1 of the way among obstacles, a fitted predictor, or
-            ``"module:Class"``; see :class:`.ReachWatcher`, also for what happens when it
-            fails (the robot waits and the episode goes on).
+        predictor: Predicts the person's goals: None or ``"bayesian"`` for the built-in Bayesian goal inference along
+            shortest paths among obstacles, the name of another predictor, ``"module:Class"``, or a predictor; see
+            :class:`.IntentObserver`. Where it fails the robot waits and the episode goes on.
         threshold: Probability a goal must exceed, 0 to 1. 0: acts at once, on whatever goal is most probable (of tied
             ones the nearest to the hand); 1: never acts.
         rate: How often per second :meth:`step` is called.
@@ -75,12 +75,12 @@ class RobotPartner:
 
     Raises:
         ValueError: An argument out of range, or a predictor that cannot be imported.
-        TypeError: Something else than a predictor.
+        TypeError: An object that is no predictor.
     """
 
     def __init__(
         self,
-        predictor: Any = None,
+        predictor: object = None,
         *,
         threshold: float = 0.8,
         rate: float = 30.0,
@@ -99,15 +99,15 @@ class RobotPartner:
         self.grasp_time = _number("grasp_time", grasp_time, 0)
         self.clearance = _number("clearance", clearance, 0)
         self.home = None if home is None else point(home, "the robot's `home`")
-        self._watcher = ReachWatcher(predictor)
+        self._observer = IntentObserver(predictor)
 
     def __repr__(self) -> str:
-        return f"RobotPartner({self._watcher.name}, threshold={self.threshold!r}, max_speed={self.max_speed!r})"
+        return f"RobotPartner({self._observer.name}, threshold={self.threshold!r}, max_speed={self.max_speed!r})"
 
     @property
     def failure(self) -> str | None:
         """The first error of the predictor, or None."""
-        return self._watcher.failure
+        return self._observer.failure
 
     def reset(self, layout: TabletopLayout, task: TabletopTask, rng: np.random.Generator | None = None) -> Floats:
         """Begin an episode.
@@ -126,7 +126,7 @@ class RobotPartner:
             raise ValueError(f"the robot's `home` at {self._home} is off the table of {width:g} x {depth:g} m")
         self._row = {name: row for row, name in enumerate(layout.goals)}
         self._place = {name: (float(x), float(y)) for name, (x, y) in task.configuration.items()}
-        self._watcher.reset(layout, task)
+        self._observer.reset(layout, task)
         self._state: State = "wait"
         self._target: str | None = None
         self._since = 0.0
@@ -136,7 +136,7 @@ class RobotPartner:
 
     def step(self, senses: Senses) -> Command:
         """What to do until the next call, 1 / ``rate`` seconds later."""
-        belief, predicted = self._read(senses)
+        belief, predicted = self._predict(senses)
         conflict = self._revise(senses, predicted)
         gripper = _pair(senses.gripper)
         there = self._destination(senses, gripper)
@@ -155,14 +155,14 @@ class RobotPartner:
 
     # -- what the person does ------------------------------------------------------------------------------------------
 
-    def _read(self, senses: Senses) -> tuple[dict[str, float] | None, str | None]:
+    def _predict(self, senses: Senses) -> tuple[dict[str, float] | None, str | None]:
         """The belief, and the goal the robot is sure of."""
         if senses.person_holding is not None:
             self._ended_reach = senses.reach_number
             return None, senses.person_holding if self.threshold < 1 else None
         if senses.reach_number == self._ended_reach:
             return None, None
-        belief = self._watcher.observe(senses)
+        belief = self._observer.observe(senses)
         return belief, None if belief is None else self._sure_of(belief, senses)
 
     def _sure_of(self, belief: Mapping[str, float], senses: Senses) -> str | None:
@@ -228,9 +228,9 @@ def _pair(array: Floats) -> Point:
     return x, y
 
 
-def _number(name: str, value: Any, least: float, most: float = math.inf) -> float:
-    ok = isinstance(value, int | float) and not isinstance(value, bool) and least <= value <= most and value < math.inf
-    if not ok:
+def _number(name: str, value: object, least: float, most: float = math.inf) -> float:
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not is_number or not least <= value <= most or not value < math.inf:
         wanted = f"{least:g} to {most:g}" if most < math.inf else f"a finite number >= {least:g}"
         raise ValueError(f"the robot's `{name}` must be {wanted}, got {value!r}")
     return float(value)

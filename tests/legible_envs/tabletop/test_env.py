@@ -35,9 +35,9 @@ from tests.legible_envs.tabletop.table_player import (
 )
 
 VARIANTS = [
-    {"layout": WALL, "obstacles": "soft", "crossing_cost": 1.0},
+    {"layout": WALL, "virtual_obstacles": "soft", "crossing_cost": 1.0},
     {"layout": WALL, "contact": "always", "max_speed": 0.5},
-    {"task": "tea", "contact": "never", "predictor": "eq1"},
+    {"task": "tea", "contact": "never", "predictor": "bayesian"},
     {"task": "bins", "max_obstacles": 0},
     {"layout": WALL, "partner": "robot", "contact": "always", "max_speed": 0.5},
     {"partner": {"max_speed": 0.5}, "threshold": 0.0, "time_cost": 0.0},
@@ -109,7 +109,7 @@ def test_replays_are_exact_in_a_new_process():
 
 
 def test_vectors_of_tables():
-    envs = gym.make_vec(NAME, num_envs=2, vectorization_mode="sync", predictor="eq1")
+    envs = gym.make_vec(NAME, num_envs=2, vectorization_mode="sync", predictor="bayesian")
     envs.reset(seed=0)
     envs.set_attr("layout", [WALL, TASK.layout])
     _, info = envs.reset()
@@ -147,7 +147,7 @@ def test_a_player_finishes_every_task(task, done):
     env = make(task=task)
     results = play(env)
     assert [result[2] for result in results] == [False] * (len(results) - 1) + [True]
-    assert results[-1][4]["done"] == done
+    assert results[-1][4]["num_done"] == done
     assert math.fsum(r[1] for r in results) == pytest.approx(done - 0.05 * len(results) / 30)
     game, layout = env.unwrapped, env.unwrapped.layout
     for name, at in game.task.configuration.items():
@@ -172,7 +172,7 @@ def test_the_task_says_what_is_valid_when():
     stages = TASK.graph.stages()
     order = (*FIRST[::-1], *SECOND)
     for number, name in enumerate(order):
-        assert info["done"] == number
+        assert info["num_done"] == number
         assert info["candidate_set"] == "game"
         assert set(info["goals"]) == {*(FIRST if number < 4 else SECOND)} - {*order[:number]}
         stage = stages[info["stage"]]
@@ -187,7 +187,7 @@ def test_nothing_is_valid_while_something_is_carried():
     env.reset()
     go_to(env, TASK.layout.place(FIRST[0]), near=0.02)
     assert env.unwrapped.holding == FIRST[0]
-    assert env.unwrapped.goals == ()
+    assert env.unwrapped.valid_goal_names() == ()
     assert env.unwrapped.carry_to.tolist() == list(TASK.configuration[FIRST[0]])
     before = env.unwrapped.hand
     _, _, _, _, info = env.step(np.array([0.1, 0.1]))
@@ -373,12 +373,12 @@ def test_hard_obstacles_stop_the_hand_at_its_width():
 
 
 def test_soft_obstacles_count_and_cost():
-    env = make(layout=WALL, obstacles="soft", crossing_cost=0.25, time_cost=0.0)
+    env = make(layout=WALL, virtual_obstacles="soft", crossing_cost=0.25, time_cost=0.0)
     env.reset(options={"start": (0.55, 0.15)})
     rewards = [env.step(np.array([0.0, y]))[1] for y in (0.5, 0.5, 0.5, 0.5, -0.5, -0.5, -0.5)]
     assert sum(rewards) == -0.5
     assert env.unwrapped.view().crossings == 2
-    assert env.unwrapped.view().obstacles_mode == "soft"
+    assert env.unwrapped.view().virtual_obstacles == "soft"
     env.reset(options={"start": (0.55, 0.15)})
     assert env.step(np.array([0.5, 0.0]))[4]["crossings"] == 0
 
@@ -388,7 +388,7 @@ def test_a_fast_hand_passes_no_thin_obstacle():
     env.reset(options={"start": (0.55, 0.1)})
     env.step(np.array([0.0, 1.0]))
     assert env.unwrapped.hand[1] < 0.2
-    soft = make(layout=WALL, max_speed=30.0, obstacles="soft")
+    soft = make(layout=WALL, max_speed=30.0, virtual_obstacles="soft")
     soft.reset(options={"start": (0.55, 0.1)})
     assert soft.step(np.array([0.0, 1.0]))[4]["crossings"] == 1
 
