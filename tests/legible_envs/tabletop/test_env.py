@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import itertools
 import json
 import math
 import os
@@ -127,6 +128,36 @@ def test_vectors_of_tables_where_one_has_a_belief_and_the_other_none(busy):
     assert info["holding"].tolist() == [FIRST[0] if i == busy else None for i in range(2)]
     for goal in FIRST:
         assert info["belief"]["_" + goal].tolist() == [i != busy for i in range(2)]
+
+
+@pytest.mark.parametrize("mode", ["sync", "async"])
+def test_vectors_stack_what_is_valid(mode):
+    envs = gym.make_vec(NAME, num_envs=2, vectorization_mode=mode, partner="robot")
+    _, info = envs.reset(seed=0)
+    try:
+        for _ in range(3):
+            assert info["goal_mask"].shape == (2, 8)
+            assert info["goal_mask"].dtype == np.bool_
+            for mask, names in zip(info["goal_mask"], info["goals"], strict=True):
+                assert {name for name, valid in zip(TASK.layout.goals, mask, strict=True) if valid} == set(names)
+            assert info["num_done"].tolist() == [0, 0]
+            assert envs.call("valid_goal_names") == tuple(info["goals"])
+            _, _, _, _, info = envs.step(envs.action_space.sample() * 0)
+    finally:
+        envs.close()
+
+
+def test_info_has_the_same_keys_and_shares_no_array():
+    env = make(partner="robot")
+    seen = [env.reset(seed=0)[1]] + [result[4] for result in play(env)]
+    assert all(info.keys() == seen[0].keys() for info in seen)
+    assert "done" not in seen[0]
+    for info in seen:
+        assert info["goals"] == tuple(sorted(info["goals"]))
+        assert set(info["goals"]) == set(np.array(TASK.layout.goals)[info["goal_mask"]])
+    assert len({id(info["goal_mask"]) for info in seen}) == len(seen)
+    assert not any(np.shares_memory(a["goal_mask"], b["goal_mask"]) for a, b in itertools.pairwise(seen))
+    assert not seen[-1]["goal_mask"].any()
 
 
 def test_partners_are_not_shared_among_environments():

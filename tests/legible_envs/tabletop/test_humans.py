@@ -322,6 +322,25 @@ def test_orders_are_uniformly_random_and_seeds_repeat(tmp_path: object) -> None:
     assert simulate_participants(tea.layout, 0, np.random.default_rng(0)) == []
 
 
+@pytest.mark.parametrize("name", ["columns", "tea", "bins"])
+def test_the_task_is_the_packaged_one_that_has_the_objects(name: str) -> None:
+    task = TabletopTask.named(name)
+    layout = TabletopLayout.from_json(task.layout.to_json())
+    assert TabletopTask.for_layout(layout) is task
+    people = (simulate_participants(layout, 2, np.random.default_rng(0), task=given) for given in (None, task))
+    assert next(people) == next(people)
+    one = (simulate_task(layout, Person(), np.random.default_rng(0), task=given) for given in (None, task))
+    assert next(one) == next(one)
+
+
+def test_without_a_packaged_task_one_must_be_named() -> None:
+    layout, rng = detour(), np.random.default_rng(0)
+    with pytest.raises(LayoutError, match=r"no task of the package \(bins, columns, tea\) has the objects \['cup'\]"):
+        simulate_participants(layout, 1, rng)
+    with pytest.raises(LayoutError, match="name the task"):
+        simulate_task(layout, Person(), rng)
+
+
 def test_a_workspace_has_people() -> None:
     workspace = TabletopWorkspace("tea")
     genome = workspace.sample(1, np.random.default_rng(0))[0]

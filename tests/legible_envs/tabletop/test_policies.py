@@ -114,6 +114,23 @@ def test_a_team_finishes_sooner_and_never_waits_for_ever() -> None:
     assert all(info["num_done"] == 8 for info in team)
 
 
+def test_a_player_belongs_to_one_table_and_plays_under_wrappers() -> None:
+    with pytest.raises(ValueError, match="one environment"):
+        ReachingPlayer(gym.make_vec("LegibleTabletop-v0", num_envs=2), *someone(0))  # type: ignore[arg-type]
+    plain = gym.make("LegibleTabletop-v0", task="tea")
+    wrapped = gym.wrappers.RescaleObservation(plain, np.float32(0.0), np.float32(1.0))
+    actions = []
+    for env in (plain, wrapped):
+        player = ReachingPlayer(env, *someone(1))
+        obs, info = env.reset(seed=0)
+        played = []
+        for _ in range(120):
+            played.append(player(obs, info))
+            obs, *_, info = env.step(played[-1])
+        actions.append(np.array(played))
+    assert np.array_equal(*actions)
+
+
 def test_grasps_and_releases_take_the_persons_pause() -> None:
     times = [play(someone(0, pause=pause), task="tea")[2]["time"] for pause in (0.0, 1.0)]
     assert times[1] - times[0] == pytest.approx(9.0, abs=0.4)  # 5 grasps and 4 releases before the last
