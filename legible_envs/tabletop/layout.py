@@ -87,7 +87,7 @@ class TabletopLayout:
                 rule="name",
             )
 
-    # -- what is where -------------------------------------------------------------------------------------------------
+    # -- content -------------------------------------------------------------------------------------------------------
 
     @property
     def objects(self) -> tuple[TableObject, ...]:
@@ -151,7 +151,7 @@ class TabletopLayout:
     # -- whether a person can work here --------------------------------------------------------------------------------
 
     def validate(self) -> None:
-        """Check what makes a table usable.
+        """Check whether a person can work at this table.
 
         Raises:
             LayoutError: ``rule`` is ``"region"`` (a movable object's centre outside the region), ``"table"`` (an object
@@ -262,7 +262,7 @@ class TabletopLayout:
                 :class:`~legible_envs.tabletop.objects.Table`.
 
         Raises:
-            LayoutError: Another schema, missing or unknown keys, or what the constructors reject.
+            LayoutError: Another schema, missing or unknown keys, or values that the constructors reject.
         """
         if not isinstance(data, Mapping):
             raise LayoutError(f"a layout must be a mapping, got {type(data).__name__}", rule="schema")

@@ -82,7 +82,7 @@ class TableObject:
         name: Unique name; the goal's name in the task.
         at: ``(x, y)`` of its centre in metres.
         colour: Any CSS-like colour name.
-        shape: What is drawn on it, such as ``"circle"``.
+        shape: The shape drawn on it, such as ``"circle"``.
         size: ``(length, width)`` in metres; a cube of 4.5 cm by default.
         angle: Direction of its length in radians, counter-clockwise from the x-axis.
         movable: Whether a design may put it elsewhere.

@@ -46,7 +46,7 @@ class TableGame:
     """One table in play.
 
     Args:
-        task: What is built.
+        task: The task.
         rules: The options of the game.
 
     Attributes:
@@ -56,7 +56,7 @@ class TableGame:
         hand: ``(x, y)`` in metres.
         velocity: ``(x, y)`` in m/s, of the last step.
         is_low: Whether the hand is at the height of the objects.
-        holding: Index of what the hand holds, or -1.
+        holding: Index of the object in the hand, or -1.
         delivery: Where that belongs, or None.
         status: ``(n,)`` int, 0 to 3: free, in the hand, in the gripper, placed.
         goal: The person's goal, where it was set.
@@ -146,7 +146,7 @@ class TableGame:
 
     @property
     def robot_holding(self) -> int:
-        """Index of what the gripper holds, or -1."""
+        """Index of the object in the gripper, or -1."""
         return -1 if self._robot_delivery is None else self.index[self._robot_delivery.goal]
 
     # -- the person ----------------------------------------------------------------------------------------------------

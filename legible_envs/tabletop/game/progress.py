@@ -33,7 +33,7 @@ class Delivery:
 
 
 class TaskProgress:
-    """Counts what is done and begun, by one or several agents.
+    """Counts the subtasks done and begun, by one or several agents.
 
     A subtask is *begun* when its goal is taken, *done* when the goal is where it belongs. A subtask that
     waits for others may be begun when they are done, and only once. A subtask is begun only if the task can still be

@@ -28,7 +28,7 @@ class TableView:
 
     Attributes:
         layout: The layout that the episode began with: its obstacles, colours, shapes and sizes.
-        task: What is built.
+        task: The task.
         positions: ``(n, 2)`` centres of the objects now, in the order of ``layout.objects``.
         angles: ``(n,)`` their angles now.
         status: For each object ``"free"`` (lies on the table), ``"hand"`` or ``"robot"`` (is carried), or ``"placed"``

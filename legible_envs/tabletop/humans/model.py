@@ -38,7 +38,7 @@ class Person:
         skew: Median exponent of time; 1 is minimum jerk, more is an earlier peak of speed.
         skew_trial: Standard deviation of its logarithm from reach to reach.
         bow: Mean lateral deviation in the middle of a leg, to the left, as a share of the leg's length.
-        bow_turns: What direction ``d`` (from start to goal, counter-clockwise from the x-axis) adds to it:
+        bow_turns: Addition to it in direction ``d`` (from start to goal, counter-clockwise from the x-axis):
             ``a cos d + b sin d + c cos 2d + e sin 2d``.
         bow_trial: Standard deviation from reach to reach.
         aim: Standard deviation of the deviation, as a share of the leg's length, that goes to one side in the first

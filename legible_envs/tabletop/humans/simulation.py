@@ -48,7 +48,7 @@ _FARTHEST_BOW: Final = 0.5
 
 
 class _Route(NamedTuple):
-    """What a shortest path depends on."""
+    """The inputs of a shortest path."""
 
     start: Point
     goal: str | Point
@@ -113,7 +113,7 @@ def sample_person(rng: np.random.Generator, population: ReachModel | None = None
 
 
 class ReachPlan(NamedTuple):
-    """What a person means to do.
+    """The plan of one reach.
 
     Attributes:
         path: ``(k, 2)`` points of a smooth path.
@@ -319,7 +319,7 @@ def _execute(
 
 
 class _Intent(NamedTuple):
-    """What a person decides before setting out.
+    """The decisions of a person before they set out.
 
     Attributes:
         start: Point where the reach begins.

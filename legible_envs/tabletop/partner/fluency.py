@@ -20,22 +20,22 @@ __all__ = ["ReachPrediction", "TeamMetrics", "Tick", "tick_of"]
 
 @dataclass(frozen=True, slots=True)
 class Tick:
-    """One line of a log: what held from ``time`` until the next line.
+    """One line of a log: the state from ``time`` until the next line.
 
-    An *action* is a stretch of lines in a row with the same label; None is no action. A person's action is a reach with
-    what follows until the object is placed, a robot's is to fetch one object.
+    An *action* is a stretch of lines in a row with the same label; None is no action. A person's action is a reach and
+    the carrying until the object is placed, a robot's is to fetch one object.
 
     Attributes:
         time: Seconds, not before that of the line before.
-        human: Label of what the person does; None while idle.
-        robot: Label of what the robot does; None while idle (waiting, or returning home).
+        human: Label of the person's action; None while idle.
+        robot: Label of the robot's action; None while idle (waiting, or returning home).
         reach: How many reaches the person has begun; 0 before the first.
-        taken: What the person holds.
-        predicted: What the robot is sure the person reaches for; None while it is not.
+        taken: Object in the person's hand.
+        predicted: Goal that the robot is sure of; None while it is not sure.
         choices: How many objects the person may validly reach for; 0 while they must wait. Does not count while they
             hold something. A real choice unless told otherwise.
         conflict: Whether the robot gave up its target in this line because the person took it.
-        lost: Whether the robot took in this line what the person was going for, where that is known.
+        lost: Whether the robot took the person's goal in this line, where that goal is known.
     """
 
     time: float
@@ -53,10 +53,10 @@ def tick_of(senses: Senses, command: Command, human_active: bool, lost: bool = F
     """The line of a log for one step of a robot.
 
     Args:
-        senses: What the robot sensed.
-        command: What it did.
+        senses: The robot's senses.
+        command: Its command.
         human_active: Whether the person is doing something: moving their hand, taking or placing an object.
-        lost: Whether the robot took what the person was going for.
+        lost: Whether the robot took the person's goal.
     """
     return Tick(
         time=senses.time,
@@ -77,11 +77,11 @@ class ReachPrediction:
 
     Attributes:
         reach: Number of the reach.
-        taken: What the person took.
-        duration: Seconds from the reach's first line with anything to reach for to that in which it was taken.
+        taken: Object that the person took.
+        duration: Seconds from the reach's first line with a valid goal to that in which the object was taken.
         decision_time: Seconds from its first line to that in which the robot was sure for the first time; all of
             ``duration`` where it never was.
-        predicted: What it was sure of then; None where it never was.
+        predicted: Goal it was sure of then; None where it never was.
         choices: The most objects that could validly be reached for in one line; with 1 there is nothing to predict.
     """
 
@@ -116,8 +116,8 @@ class TeamMetrics:
 
     Attributes:
         predictions: One for every reach that ended in taking an object.
-        conflicts: How often both wanted the same object: the person took the robot's target, or the robot took what
-            the person was known to go for.
+        conflicts: How often both wanted the same object: the person took the robot's target, or the robot took
+            the person's known goal.
         goals_lost: How often it was the latter, the price of acting on a wrong guess.
     """
 

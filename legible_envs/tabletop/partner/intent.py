@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 __all__ = ["IntentObserver", "Predictor", "make_intent_predictor"]
 
 Predictor = StreamingPredictor | PrefixPredictor
-"""What an :class:`IntentObserver` can ask."""
+"""A predictor that an :class:`IntentObserver` can follow a reach with."""
 
 _SUM_TOLERANCE: Final = 1e-6
 _PARTICIPANTS: Final = 3
@@ -70,7 +70,7 @@ def make_intent_predictor(spec: object = None) -> Predictor:
 
 
 class IntentObserver:
-    """What a predictor believes about the present reach of a person.
+    """Follows the reaches of a person with a predictor, which says how probable each goal is.
 
     The predictor sees each reach from its beginning, in the order in which it happened and nothing of the future. Where
     the valid goals change during a reach, the predictor sees this reach again with the new ones. An exception, or an
@@ -85,7 +85,7 @@ class IntentObserver:
         predictor: A predictor in any form that :func:`make_intent_predictor` takes.
 
     Attributes:
-        name: What the predictor is called in messages.
+        name: Name of the predictor in messages.
         failure: The first error of the predictor, or None.
     """
 
@@ -230,7 +230,7 @@ def _open_stream(predictor: Predictor, context: Trajectory) -> GoalStream:
 
 
 def _context(senses: Senses, layout: TabletopLayout) -> Trajectory:
-    """What is known of a reach before its first point."""
+    """The facts of a reach that are known before its first point."""
     starts = layout.table.starts
     nearest = min(starts, key=lambda name: math.dist(starts[name], senses.start))
     rows = [layout.index(goal) for goal in senses.goals]

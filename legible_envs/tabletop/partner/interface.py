@@ -1,4 +1,4 @@
-"""What partners and predictors are told and what they answer: any object with these methods can take part."""
+"""The inputs and answers of partners and predictors: any object with these methods can take part."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ State = Literal["wait", "approach", "grasp", "carry", "place"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Senses:
-    """What a robot knows when it is asked. Points are in metres, as in a layout; arrays must not be written to.
+    """All that a robot knows when it decides. Points are in metres, as in a layout; arrays must not be written to.
 
     A *reach* begins when the person sets out with an empty hand and ends when they hold an object. While they hold
     one, ``reach``, ``times`` and ``start`` stay those of the reach that ended.
@@ -37,9 +37,9 @@ class Senses:
         goals: Objects the person may validly take now; empty while they hold one or must wait.
         free: Objects that lie free and that the robot may validly take now.
         positions: ``(n, 2)`` where the objects are now, in the order of the layout.
-        person_holding: What the person holds.
+        person_holding: Object in the person's hand.
         gripper: ``(2,)`` the robot's gripper now.
-        holding: What the robot holds.
+        holding: Object in the gripper.
     """
 
     time: float
@@ -58,19 +58,19 @@ class Senses:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Command:
-    """What a robot does until it is asked again.
+    """A robot's command, which holds until the next one.
 
     Attributes:
         velocity: ``(2,)`` of the gripper in m/s.
         grasp: Object to close the gripper on now; it is within reach unless it was moved. The next senses tell by
             ``holding`` whether it was caught.
-        release: Whether to open the gripper now; what it held stays at its place in the configuration, if the gripper
+        release: Whether to open the gripper now; the object stays at its place in the configuration, if the gripper
             is there, else where it is dropped.
         target: Object the robot goes for or carries.
-        belief: ``{goal: probability}`` of the person's present reach; None where there is nothing to believe.
-        decided: Whether the robot is sure what the person goes for, or sees them hold it.
-        predicted: What that is; None where it is not sure.
-        state: What the robot is doing.
+        belief: ``{goal: probability}`` of the person's present reach; None where there is no belief.
+        decided: Whether the robot is sure of the person's goal, or sees them hold it.
+        predicted: That goal; None where it is not sure.
+        state: State of the robot.
         conflict: Whether the robot gave up its target just now because the person took it.
     """
 
@@ -92,7 +92,7 @@ class Partner(Protocol):
         """Begin an episode; ``(2,)`` where the gripper is, or None for the middle of the table's far side."""
 
     def step(self, senses: Senses) -> Command:
-        """What to do until the next call."""
+        """The command until the next call."""
         ...
 
 

@@ -64,7 +64,7 @@ class Steering:
         return speed * math.cos(direction), speed * math.sin(direction)
 
     def _kept_clear(self, velocity: Point, gripper: Point, hand: Point) -> Point:
-        """The velocity without what would bring the gripper too near to the hand, or with what takes it away."""
+        """The velocity without the part that brings the gripper too near to the hand, or with one that leads away."""
         rx, ry = gripper[0] - hand[0], gripper[1] - hand[1]
         away = math.hypot(rx, ry)
         # From right under it: away from where the person sits.

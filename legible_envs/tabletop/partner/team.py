@@ -137,7 +137,7 @@ class Team:
         return done
 
     def log(self, game: TableGame, has_acted: bool) -> None:
-        """Note what the tick that ends now was like.
+        """Add the tick that ends now to the log.
 
         Args:
             game: As it is at the end of the tick.

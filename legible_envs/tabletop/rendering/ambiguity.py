@@ -49,7 +49,7 @@ def ambiguous_reaches(
 
     Args:
         layout: The table.
-        task: What is done there.
+        task: The task.
         beta: Rationality per metre.
         pieces: Pieces of a reach.
     """

@@ -68,7 +68,7 @@ def paste_object(
     """Draw an object with its centre at a point on the table.
 
     Args:
-        image: What to draw on.
+        image: The image to draw on.
         frame: Where the table lies in it.
         obj: The object: its colour, shape and size.
         x: Metres.

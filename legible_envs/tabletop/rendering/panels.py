@@ -1,4 +1,4 @@
-"""The figure of the paper: what is built, and the layouts that searches found for it, side by side."""
+"""The figure of the paper: the layouts that searches found for a task, and its configuration, side by side."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ def draw_panels(
     grown: bool = False,
     beta: float = 20.0,
 ) -> Image:
-    """Draw layouts of one task side by side, then the configuration to be built and what the marks mean.
+    """Draw layouts of one task side by side, then the configuration to be built and a legend.
 
     With the baseline and the best layouts of the three conditions this is the figure of Tung et al. (HRI 2024).
 
     Args:
         panels: Layouts by title, such as ``{"Baseline": …, "Placement Optimized": …}``.
-        task: What is built on them.
+        task: The task of all layouts.
         captions: Lines beneath each panel, by title. None writes legibility, mean detour and length of the path.
         scorer: Scores the layouts for the captions; one with the field's defaults if None.
         width: Pixels of a panel.
@@ -116,7 +116,7 @@ def stage_of(graph: TaskGraph) -> dict[str, int]:
 
 
 def draw_configuration(task: TabletopTask, *, width: int = 560) -> Image:
-    """Draw what is to be built, every object in its place, with the stage in which it is fetched beside it.
+    """Draw the configuration of a task: every object in its place, beside it the stage in which it is fetched.
 
     Returns:
         ``(h, width, 3)`` uint8, as high as a table.
@@ -158,7 +158,7 @@ def _order_words(task: TabletopTask) -> str:
 
 
 def _legend(task: TabletopTask, width: int, size: int, ambiguity: bool, obstacles: bool) -> Image:
-    """What the marks mean, on a card as large as a panel."""
+    """The legend, on a card as large as a panel."""
     marks = [("where the hand starts a reach", _start_mark)]
     if obstacles:
         marks.append(("virtual obstacle, which the hand goes round", _obstacle_mark))

@@ -1,4 +1,4 @@
-"""A table in use: the hand, the robot's gripper, what they carry, and what the robot believes."""
+"""A table in use: the hand, the robot's gripper, the objects they carry, and the robot's belief."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _BAR: Final = (0.058, 0.012)
 
 
 def scene_shape(view: TableView, *, width: int = 640, hud: bool = True) -> tuple[int, int, int]:
-    """The shape of what :func:`draw_scene` returns."""
+    """The shape of the picture that :func:`draw_scene` returns."""
     frame = Frame.of(view.layout.table, check_width(width))
     return frame.height + (hud_height(frame.width) if hud else 0), frame.width, 3
 
@@ -109,7 +109,7 @@ def _draw_lying(image: Image, frame: Frame, view: TableView) -> None:
 
 
 def _draw_marks(image: Image, frame: Frame, view: TableView) -> None:
-    """Rings round what the person and what the robot are going for."""
+    """Rings round the person's goal and the robot's target."""
     thick = max(2, round(0.0045 * frame.scale))
     for name, colour, grow in ((view.goal, TABLE["skin_line"], 0.008), (view.robot_target, TABLE["robot"], 0.015)):
         if name is None or name not in view.layout.goals:
@@ -175,6 +175,6 @@ def _draw_bar(image: Image, left: int, top: int, wide: int, tall: int, value: fl
 
 
 def _fill(image: Image, left: int, top: int, wide: int, tall: int, colour: str) -> None:
-    """A filled rectangle; what lies outside is cut off."""
+    """A filled rectangle, cut off at the edges of the image."""
     right, bottom = max(left + wide, 0), max(top + tall, 0)
     image[max(top, 0) : bottom, max(left, 0) : right] = rgb(colour)

@@ -1,4 +1,4 @@
-"""What does not move while a table is used: its top, region and slots, the starts of the hand, virtual obstacles."""
+"""The still parts of a table: its top, region and slots, the starts of the hand, virtual obstacles."""
 
 from __future__ import annotations
 

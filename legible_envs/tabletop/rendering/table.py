@@ -42,8 +42,8 @@ def draw_table(
     """Draw a table at rest, without hand or robot.
 
     Args:
-        layout: The table and what lies on it.
-        task: What is built there; its slots are drawn in the assembly zone.
+        layout: The table and the objects on it.
+        task: The task; its slots are drawn in the assembly zone.
         width: Pixels, 120 to 4096.
         paths: Shortest paths to draw: from all starts (True), or from the starts (or objects) named.
         ambiguity: Whether to colour the shortest reaches of the task by how unsure an observer is of their goal at each

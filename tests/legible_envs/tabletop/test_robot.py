@@ -628,6 +628,7 @@ def test_teams_of_simulated_people_and_robots_finish_in_the_environment(argument
     from legible_envs.tabletop.humans import sample_person
     from legible_envs.tabletop.policies import ReachingPlayer
 
+    warnings.simplefilter("error", RuntimeWarning)  # the predictor never fails; pytest restores the filters
     env = gym.make("legible_envs:LegibleTabletop-v0", **arguments)
     by_robot = 0
     for seed in range(3):
@@ -645,4 +646,3 @@ def test_teams_of_simulated_people_and_robots_finish_in_the_environment(argument
         assert 0 <= info["concurrent_activity"] <= 1 - max(info["human_idle"], info["robot_idle"]) + 1e-9
         by_robot += info["num_done"] - len(env.unwrapped.trajectories())
     assert by_robot > 0
-    assert env.unwrapped._team.partner.failure is None
