@@ -110,7 +110,7 @@ def fit_reaches(
         >>> reaches = simulate_participants(task.layout, 40, rng, executions=4)
         >>> model = fit_reaches(reaches)
         >>> round(model.median.skew, 1), round(model.median.bow, 2), round(model.median.endpoint_sd, 3)
-        (1.3, -0.1, 0.015)
+        (1.4, -0.11, 0.015)
     """
     base = base or ReachModel()
     found = [_measure(reach, number, width) for number, reach in enumerate(trajectories)]

@@ -63,7 +63,7 @@ class GoalBelief:
         >>> layout = TabletopLayout([TableObject("cup", (0.4, 0.5)), TableObject("milk", (0.8, 0.5))])
         >>> belief = GoalBelief(layout, start="home")
         >>> {goal: round(p, 3) for goal, p in belief.update((0.55, 0.15)).items()}
-        {'cup': 0.86, 'milk': 0.14}
+        {'cup': 0.728, 'milk': 0.272}
     """
 
     def __init__(

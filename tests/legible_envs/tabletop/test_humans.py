@@ -360,7 +360,7 @@ def test_the_first_sample_gives_nothing_away() -> None:
     reaches = [
         reach
         for number, layout in enumerate([COLUMNS.layout, with_walls()])
-        for reach in simulate_participants(COLUMNS, layout, 60, np.random.default_rng(number))
+        for reach in simulate_participants(layout, 60, np.random.default_rng(number))
     ]
     prior = np.array([1 / len(reach.candidates) for reach in reaches])
     first = [reach.first(1) for reach in reaches]
