@@ -180,8 +180,8 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
     def __init__(
         self,
         *,
-        task: Any = "columns",
-        layout: Any = None,
+        task: object = "columns",
+        layout: object = None,
         virtual_obstacles: str = "hard",
         contact: str = "slow",
         max_obstacles: int = 4,
@@ -307,12 +307,14 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
         return self._chosen or self._game.layout
 
     @layout.setter
-    def layout(self, value: Any) -> None:
+    def layout(self, value: object) -> None:
         self._chosen = None if value is None else self._read(value)
 
-    def _read(self, value: Any) -> TabletopLayout:
-        known = (self._chosen, self._game.layout, self.settings.layout)
-        return value if any(value is layout for layout in known) else self.settings.read(value)
+    def _read(self, value: object) -> TabletopLayout:
+        for known in (self._chosen, self._game.layout, self.settings.layout):
+            if known is not None and value is known:
+                return known
+        return self.settings.read(value)
 
     # -- the running game -------------------------------------------------------------------------------------------
 
@@ -453,7 +455,7 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
     def _name(self, i: int) -> str | None:
         return self._game.names[i] if i >= 0 else None
 
-    def _check_goal(self, goal: Any, valid: tuple[str, ...]) -> None:
+    def _check_goal(self, goal: object, valid: tuple[str, ...]) -> None:
         if goal not in valid:
             raise LayoutError(
                 f"the goal must be an object that is valid now, one of {list(valid)}; got {goal!r}", rule="goal"

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from itertools import product
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -31,7 +31,7 @@ ELSEWHERE: Final = "elsewhere"
 """Name of a start that is none of the table's."""
 
 
-def read_task(value: Any) -> TabletopTask:
+def read_task(value: object) -> TabletopTask:
     """A task from any description of one.
 
     Args:
@@ -55,7 +55,7 @@ def read_task(value: Any) -> TabletopTask:
     )
 
 
-def read_layout(value: Any, task: TabletopTask, max_obstacles: int) -> TabletopLayout:
+def read_layout(value: object, task: TabletopTask, max_obstacles: int) -> TabletopLayout:
     """A valid arrangement of a task's objects from any description of one.
 
     Args:
@@ -86,7 +86,7 @@ def read_layout(value: Any, task: TabletopTask, max_obstacles: int) -> TabletopL
     return layout
 
 
-def _numbers(value: Any) -> Any:
+def _numbers(value: object) -> npt.NDArray[np.float64]:
     try:
         array = np.asarray(value)
         if array.dtype.kind not in "iuf":
@@ -129,7 +129,7 @@ class Start(NamedTuple):
     at: Point
 
 
-def read_start(value: Any, layout: TabletopLayout) -> Start:
+def read_start(value: object, layout: TabletopLayout) -> Start:
     """Name and point of where the hand starts.
 
     Args:
@@ -164,8 +164,8 @@ class TableSettings:
     def __init__(
         self,
         *,
-        task: Any,
-        layout: Any,
+        task: object,
+        layout: object,
         virtual_obstacles: str,
         contact: str,
         max_obstacles: int,
@@ -200,18 +200,19 @@ class TableSettings:
         self.threshold = _number("threshold", threshold, most=1.0)
         self.layout = self.task.layout if layout is None else self.read(layout)
 
-    def read(self, layout: Any) -> TabletopLayout:
+    def read(self, layout: object) -> TabletopLayout:
         """A layout that this environment can play, from any form that :func:`read_layout` takes."""
         return read_layout(layout, self.task, self.max_obstacles)
 
 
-def _number(name: str, value: Any, least: float = 0.0, most: float = math.inf) -> float:
-    ok = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
-    if not ok or not math.isfinite(value) or not least <= value <= most:
+def _number(name: str, value: object, least: float = 0.0, most: float = math.inf) -> float:
+    is_number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
+    number = float(value) if is_number else math.nan  # type: ignore[arg-type]
+    if not math.isfinite(number) or not least <= number <= most:
         bounds = "" if math.isinf(least) else f" >= {least:g}"
         bounds += "" if math.isinf(most) else f" and <= {most:g}"
         raise ValueError(f"`{name}` must be a finite number{bounds}, got {value!r}")
-    return float(value)
+    return number
 
 
 def keys_to_action(max_speed: float) -> dict[tuple[int, ...], npt.NDArray[np.float32]]:
