@@ -109,7 +109,9 @@ class TableDesign(Design):
         """The table with its shortest reaches, coloured by how unsure an observer is of their goal."""
         from legible_envs.tabletop.rendering import draw_table
 
-        return draw_table(self.layout, task=self.task, width=960, doubt=True, beta=beta_of(self.workspace), grown=True)
+        return draw_table(
+            self.layout, task=self.task, width=960, ambiguity=True, beta=beta_of(self.workspace), grown=True
+        )
 
     def write_picture(self, path: Path | None) -> tuple[str, Path] | None:
         """For a run the boards, into its folder unless told otherwise; else the table."""
@@ -203,22 +205,12 @@ def load_table(source: str, task: str | None = None) -> TableDesign:
 
 
 def _task_of(layout: TabletopLayout, named: str | None) -> TabletopTask:
-    from legible_envs.tabletop.task import task_names
-
     if named is not None:
         return TabletopTask.from_yaml(named) if named.endswith((".yaml", ".yml")) else TabletopTask.named(named)
-
-    def things(of: TabletopLayout) -> tuple[str, ...]:
-        return (*of.goals, *of.table.starts)
-
-    for name in task_names():
-        task = TabletopTask.named(name)
-        if things(task.layout) == things(layout):
-            return task
-    raise LayoutError(
-        f"no task of the package is about {list(layout.goals)}: name it with --task NAME or --task FILE.yaml",
-        rule="object",
-    )
+    try:
+        return TabletopTask.for_layout(layout)
+    except LayoutError as error:
+        raise LayoutError(f"{error} with --task NAME or --task FILE.yaml", rule=error.rule) from error
 
 
 class TablePresenter(Presenter):
@@ -292,10 +284,10 @@ class TablePresenter(Presenter):
         return table_text(console, layout)
 
     def draw(self, layout: TabletopLayout, workspace: Any) -> Image:
-        """The table with its shortest reaches and where their goals are in doubt."""
+        """The table with its shortest reaches and where their goals are ambiguous."""
         from legible_envs.tabletop.rendering import draw_table
 
-        return draw_table(layout, task=workspace.task, width=960, doubt=True, beta=beta_of(workspace))
+        return draw_table(layout, task=workspace.task, width=960, ambiguity=True, beta=beta_of(workspace))
 
     def write_boards(self, run: Run, path: Path | None = None) -> Path:
         """Write the boards of the paper's figure."""
@@ -378,12 +370,15 @@ class TablePresenter(Presenter):
         return boards_of(run)
 
     def ways(self, workspace: Any, layout: TabletopLayout) -> list[list[list[int]]]:
-        """Shortest reaches as ``[x, y, per cent of doubt]`` of points along each, in millimetres."""
-        from legible_envs.tabletop.rendering.doubt import doubtful_reaches
+        """Shortest reaches as ``[x, y, per cent of ambiguity]`` of points along each, in millimetres."""
+        from legible_envs.tabletop.rendering.ambiguity import ambiguous_reaches
 
         return [
-            [[*_mm(point), round(100 * doubt)] for point, doubt in zip(reach.points, [*reach.doubt, 0.0], strict=True)]
-            for reach in doubtful_reaches(layout, workspace.task, beta=beta_of(workspace), pieces=24)
+            [
+                [*_mm(point), round(100 * share)]
+                for point, share in zip(reach.points, [*reach.ambiguity, 0.0], strict=True)
+            ]
+            for reach in ambiguous_reaches(layout, workspace.task, beta=beta_of(workspace), pieces=24)
         ]
 
 

@@ -66,11 +66,11 @@ def boards_of(run: Run) -> list[Condition]:
 
 def write_boards(run: Run, path: Path | None = None) -> Path:
     """Write the figure of a run's boards and the desired configuration; ``boards.png`` in its folder if no path."""
-    from legible_envs.tabletop.rendering import draw_boards, save_png
+    from legible_envs.tabletop.rendering import draw_panels, save_png
 
     workspace = run.workspace
     boards = {condition.name: condition.layout for condition in boards_of(run)}
-    picture = draw_boards(boards, workspace.task, scorer=workspace.scorer, beta=beta_of(workspace))
+    picture = draw_panels(boards, workspace.task, scorer=workspace.scorer, beta=beta_of(workspace))
     return save_png(path or run.folder / "boards.png", picture)
 
 

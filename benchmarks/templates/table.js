@@ -43,8 +43,8 @@ function makePlace(data, { svg, number, plural }) {
     const group = svg("g", { "stroke-linecap": "round", "stroke-linejoin": "round", fill: "none" });
     group.append(svg("polyline", { points: points.map(([x, y]) => `${x},${up(y)}`).join(" "), stroke: colours.rim, "stroke-width": 11 }));
     points.slice(1).forEach(([x, y], i) => {
-      const [fromX, fromY, doubt] = points[i];
-      group.append(svg("line", { x1: fromX, y1: up(fromY), x2: x, y2: up(y), style: `stroke: ${shade(doubt / 100)}; stroke-width: 7.5px` }));
+      const [fromX, fromY, ambiguity] = points[i];
+      group.append(svg("line", { x1: fromX, y1: up(fromY), x2: x, y2: up(y), style: `stroke: ${shade(ambiguity / 100)}; stroke-width: 7.5px` }));
     });
     return group;
   }

@@ -125,7 +125,7 @@ def table_games(settings: Settings) -> list[Figure]:
     """Steps per second at tables with four obstacles, replaying episodes of simulated participants."""
     kinds: dict[str, tuple[str, dict[str, Any]]] = {
         "table env": ("steps of one table, a person alone", {}),
-        "table env belief": ("the same with the built-in Eq. 1 belief", {"predictor": "eq1"}),
+        "table env belief": ("the same with the built-in Bayesian belief", {"predictor": "bayesian"}),
         "table env robot": ("the same with the robot and its belief", {"partner": "robot"}),
     }
     samplers: dict[str, Callable[[], float]] = {}
@@ -156,13 +156,13 @@ def _deeds(env: Any, layout: Any, seed: int) -> Iterator[Deed]:
     from legible_envs.tabletop.policies import ReachingPlayer
 
     rng = np.random.default_rng(seed)
-    player = ReachingPlayer(sample_person(rng), rng)
-    env.reset(seed=seed, options={"layout": layout})
+    player = ReachingPlayer(env, sample_person(rng), rng)
+    obs, info = env.reset(seed=seed, options={"layout": layout})
     over = False
     while not over:
-        action = player(env)
+        action = player(obs, info)
         deed = action, env.unwrapped.goal
-        _, _, terminated, truncated, _ = env.step(action)
+        obs, _, terminated, truncated, info = env.step(action)
         over = terminated or truncated
         yield deed
 

@@ -2,14 +2,14 @@ from .design.differentiable import DifferentiableTable
 from .design.workspace import TabletopWorkspace
 from .layout import TabletopLayout
 from .objects import Table, TableObject, VirtualObstacle
-from .partner.belief import EqOneBelief
+from .partner.belief import GoalBelief
 from .partner.robot import RobotPartner
 from .scoring.scorer import TabletopScorer
 from .task import TabletopTask
 
 __all__ = [
     "DifferentiableTable",
-    "EqOneBelief",
+    "GoalBelief",
     "RobotPartner",
     "Table",
     "TableObject",

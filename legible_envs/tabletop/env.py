@@ -17,9 +17,9 @@ from legible_envs.support.specs import JsonSpec, check_options
 from legible_envs.tabletop.game.game import DT, RATE, TableGame
 from legible_envs.tabletop.game.view import TableView
 from legible_envs.tabletop.layout import TabletopLayout
-from legible_envs.tabletop.observations import Observer
-from legible_envs.tabletop.partner.intent import ReachWatcher
-from legible_envs.tabletop.partner.team import Team, make_partner, read_predictor
+from legible_envs.tabletop.observations import ObservationBuilder
+from legible_envs.tabletop.partner.intent import IntentObserver
+from legible_envs.tabletop.partner.team import Team, make_partner
 from legible_envs.tabletop.settings import TableSettings, keys_to_action, read_start
 from legible_envs.tabletop.task import TabletopTask
 
@@ -29,38 +29,38 @@ Floats = npt.NDArray[np.float64]
 
 
 class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
-    """A person builds something from objects on a table, alone or beside a robot that reads their reaches.
+    """A person builds something from objects on a table, alone or beside a robot that predicts their goals.
 
     ## Description
 
     A hand takes one object after another and carries each to its place, in an order that a task allows: by default
     eight cubes to two columns of four, the first column before the second, as in Tung, Luebbers, Roncone and Hayes,
     *Workspace Optimization Techniques to Improve Prediction of Human Motion During Human-Robot Collaboration* (HRI
-    2024). Where the objects lie and which virtual obstacles are projected on the table is the layout, and can be
-    changed from episode to episode.
+    2024). The layout says where the objects lie and which virtual obstacles are projected on the table; it can
+    change from episode to episode.
 
     Points are `(x, y)` in metres, origin front-left as the person sits, `x` to the right, `y` away from the person. One
     step lasts 1/30 s.
 
-    **The hand** moves exactly as told, stays on the table, and slides along what stops it. It flies over objects and
-    comes down when it is slower than `slow_speed`, beside objects, never onto one: then it *touches*.
+    **The hand** moves exactly as told, stays on the table, and slides along obstacles that stop it. It flies over
+    objects and comes down when it is slower than `slow_speed`, beside objects, never onto one: then it *touches*.
 
     - *Take*: an empty, slow hand whose centre is at most `grasp_distance` from the outline of an object that is valid
-      now (the nearest, if several) takes it. What is not valid is never taken.
-    - *Push*: what an empty, slow hand runs into and cannot take gives way (`pymunk`: dry friction with the table,
-      collisions among objects, a rim round the table). `contact="always"` keeps the hand down at every speed,
-      `"never"` keeps it up. A hand that carries something is always up.
-    - *Carry* and *place*: what is held moves with the hand. A slow hand at most `release_distance` from the place of
-      what it holds puts it exactly there, for good. This place is the one in the task's configuration; for an object
+      now (the nearest, if several) takes it. It never takes an object that is not valid.
+    - *Push*: an empty, slow hand pushes the objects it runs into and cannot take (`pymunk`: dry friction with the
+      table, collisions among objects, a rim round the table). `contact="always"` keeps the hand down at every speed,
+      `"never"` keeps it up. A hand that carries an object is always up.
+    - *Carry* and *place*: a held object moves with the hand. A slow hand at most `release_distance` from the place of
+      the object it holds puts it exactly there, for good. This place is the one in the task's configuration; for an object
       without, any point of the assembly zone with room (in the task `bins`: the next goal that is touched).
 
     **Virtual obstacles** are projected for the person alone: objects and the robot do not feel them. `"hard"` ones stop
-    the hand at their outline grown by the hand's half-width, exactly what shortest paths keep clear of; `"soft"` ones
-    can be crossed, and it is counted whenever the hand's centre enters the drawn rectangle.
+    the hand at their outline grown by the hand's half-width, which shortest paths keep clear of too; `"soft"` ones can
+    be crossed, and the environment counts how often the hand's centre enters the drawn rectangle.
 
-    **The robot** (`partner="robot"`) is asked 30 times a second. It waits until its predictor is sure what the person
-    goes for, then takes another valid object, the nearest to its gripper, and puts it in its place. Who takes an object
-    first has it; in the same step, the person.
+    **The robot** (`partner="robot"`) decides 30 times a second. It waits until its predictor is sure of the person's
+    goal, then takes another valid object, the nearest to its gripper, and puts it in its place. An object belongs to
+    the first to take it; in the same step, to the person.
 
     ## Action Space
 
@@ -97,7 +97,7 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
 
     ## Rewards
 
-    `done_reward` (1) for every subtask that is finished, whoever does it: each object placed. `time_cost` (0.05) per
+    `done_reward` (1) for every subtask that the person or the robot finishes: each object placed. `time_cost` (0.05) per
     second and `crossing_cost` (0) per crossing of a soft obstacle are subtracted.
 
     ## Starting State
@@ -119,27 +119,28 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
 
     | Key             | Content |
     | --------------- | ------- |
-    | `goals`         | names of what may validly be reached for now; empty while the hand carries something to its place |
-    | `candidate_set` | `"game"`: those goals are valid in the running game |
+    | `goals`         | tuple of str: names of the objects that may validly be reached for now, as `valid_goal_names()` gives them; empty while the hand carries an object to its place |
+    | `goal_mask`     | `(n,)` bool: the same for the `n` objects in the order of the layout |
+    | `candidate_set` | `"game"`: these goals are valid in the running game |
     | `start`         | name of where the present reach began in the task: a start of the table, an object, or `elsewhere` |
     | `stage`         | index in `task.graph.stages()` of the pair of `start` and `goals`; -1 if none |
-    | `holding`       | name of what the hand holds, or None |
-    | `done`          | number of subtasks finished |
+    | `holding`       | name of the object in the hand, or None |
+    | `num_done`      | int: subtasks finished, such as objects placed |
     | `crossings`     | number of crossings of soft obstacles |
     | `path_length`   | metres the hand has moved |
     | `time`          | seconds since the episode began |
     | `layout_id`     | twelve hexadecimal digits that identify the layout |
     | `belief`        | with a predictor or partner: `{goal: probability}` of the present reach, empty where there is none |
-    | `robot_state`, `robot_target` | with a partner: what it does, and with which object |
+    | `robot_state`, `robot_target` | with a partner: its state, and the object it goes for or carries |
     | `completion_time`, `human_idle`, `robot_idle`, `concurrent_activity`, `functional_delay`, `conflicts`, `goals_lost`, `decision_time`, `decision_fraction`, `decided`, `decided_rightly` | with a partner: measures of the team so far, see `legible_envs.tabletop.partner.fluency`; None where not known yet |
 
     ## Arguments
 
     Args:
-        task: What is built: `"columns"`, `"tea"`, `"bins"`, the path of a YAML file, a mapping, or a `TabletopTask`.
+        task: The task: `"columns"`, `"tea"`, `"bins"`, the path of a YAML file, a mapping, or a `TabletopTask`.
         layout: The arrangement: a `TabletopLayout`, JSON text or a path, a mapping, or a genome with `max_obstacles`
             obstacles.
-        obstacles: `"hard"` or `"soft"`.
+        virtual_obstacles: `"hard"`: they stop the hand; `"soft"`: they can be crossed, and crossings are counted.
         contact: When the hand pushes: `"slow"`, `"always"` or `"never"`.
         max_obstacles: Most obstacles a layout has.
         max_speed: Of the hand, m/s. The default lets people's fastest reaches pass; 0.5 is easier to explore and learn.
@@ -151,16 +152,21 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
         crossing_cost: Per crossing of a soft obstacle.
         partner: None, `"robot"`, a mapping of arguments of `RobotPartner`, `"module:Class"`, or an object with its
             methods `reset` and `step`.
-        predictor: What reads the person's reaches: `"eq1"`, the built-in Eq. 1; `"module:Class"`, the name of an
-            installed predictor, or an object; None for nothing, or the built-in one with a partner. A predictor that
-            fails is reported once by a warning; the robot waits and the episode goes on.
+        predictor: Predicts the person's goals: `"bayesian"`, the built-in Bayesian goal inference (Eq. 1) along
+            shortest paths among the obstacles; a name that `predictors.list_predictors()` lists, such as
+            `"reach-gaussian"`; `"module:Class"`; or a predictor. None means no belief without a partner, and
+            `"bayesian"` with one. On the table `"bayesian"` always means the built-in belief: the predictor of this
+            name in `predictors` is for kitchens. A predictor that must be fitted and is not learns from simulated
+            participants at this very table; to use other trajectories, pass a fitted predictor. A predictor that fails
+            during an episode is reported once by a warning; the robot waits and the episode goes on.
         threshold: Probability a goal must exceed for the robot to be sure; at 1 it never is.
         render_mode: None, `"human"` (a window) or `"rgb_array"`.
 
     Raises:
         LayoutError: A layout that cannot be read, breaks a rule (`rule` names it), or is of another task.
         TaskError: Not a task.
-        ValueError: Any other bad argument; unknown keys in the options of `reset`.
+        ValueError: Any other bad argument; unknown keys in the options of `reset`; at `reset`, a predictor given by
+            name that cannot be fitted at this table.
         TypeError: A partner or predictor that lacks the methods.
 
     ## Version History
@@ -174,9 +180,9 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
     def __init__(
         self,
         *,
-        task: Any = "columns",
-        layout: Any = None,
-        obstacles: str = "hard",
+        task: object = "columns",
+        layout: object = None,
+        virtual_obstacles: str = "hard",
         contact: str = "slow",
         max_obstacles: int = 4,
         max_speed: float = 3.0,
@@ -186,8 +192,8 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
         done_reward: float = 1.0,
         time_cost: float = 0.05,
         crossing_cost: float = 0.0,
-        partner: Any = None,
-        predictor: Any = None,
+        partner: object = None,
+        predictor: object = None,
         threshold: float = 0.8,
         render_mode: str | None = None,
     ) -> None:
@@ -195,7 +201,7 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
         self.settings = TableSettings(
             task=task,
             layout=layout,
-            obstacles=obstacles,
+            virtual_obstacles=virtual_obstacles,
             contact=contact,
             max_obstacles=max_obstacles,
             max_speed=max_speed,
@@ -211,14 +217,14 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
         self._game = TableGame(self.settings.task, self.settings.rules)
         self._game.begin(layout, layout.place(start), start)
         self._team = self._make_team(partner, predictor)
-        self._observer = Observer(self.settings.task, max_obstacles, partner is not None)
+        self._observations = ObservationBuilder(self.settings.task, max_obstacles, partner is not None)
         self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
-        self.observation_space = self._observer.space
+        self.observation_space = self._observations.space
         self._chosen: TabletopLayout | None = None
 
-    def _make_team(self, partner: Any, predictor: Any) -> Team:
+    def _make_team(self, partner: object, predictor: object) -> Team:
         if partner is None:
-            return Team(watcher=None if predictor is None else ReachWatcher(read_predictor(predictor)))
+            return Team(observer=None if predictor is None else IntentObserver(predictor))
         if not self.settings.task.configuration:
             raise ValueError(
                 f"a robot puts objects in their places in the configuration; task {self.settings.task.name!r} has none"
@@ -237,15 +243,15 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
                 it, nothing here is random.
             options: ``"layout"``: play on another layout from now on; None returns to the environment's own.
                 ``"start"``: where the hand starts this time, the name of a start or object of the table or ``(x, y)``.
-                ``"goal"``: what the first reach goes for, an object that is valid at first; until it has been taken,
-                the hand takes nothing else.
+                ``"goal"``: the goal of the first reach, an object that is valid at first; until it has been taken, the
+                hand takes no other.
 
         Returns:
             ``(observation, info)``.
 
         Raises:
-            LayoutError: A bad layout, start or goal; the environment goes on as if it had not been asked.
-            ValueError: Unknown option keys.
+            LayoutError: A bad layout, start or goal; the episode goes on as if `reset` had not been called.
+            ValueError: Unknown option keys; or a predictor given by name that cannot be fitted at this table.
         """
         super().reset(seed=seed)
         asked = check_options(options, ("layout", "start", "goal"))
@@ -254,17 +260,17 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
             chosen = None if asked["layout"] is None else self._read(asked["layout"])
         layout = chosen or self.settings.layout
         start = asked.get("start")
-        name, at = read_start(self.task.graph.start if start is None else start, layout)
+        begin = read_start(self.task.graph.start if start is None else start, layout)
         goal = asked.get("goal")
         if goal is not None:
             self._check_goal(goal, self._game.progress.first_goals)
         self._chosen = chosen
-        self._game.begin(layout, at, name, goal)
-        self._observer.enter(layout)
+        self._game.begin(layout, begin.at, begin.name, goal)
+        self._observations.enter(layout)
         self._team.begin(self._game, self.np_random)
         if self.render_mode == "human":
             self.render()
-        return self._observer.observe(self._game, self._team), self._info()
+        return self._observations.observe(self._game, self._team), self._info()
 
     def step(self, action: npt.ArrayLike) -> tuple[npt.NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """Advance by 1/30 s.
@@ -291,7 +297,7 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
         reward = settings.done_reward * finished - settings.time_cost * DT - settings.crossing_cost * crossed
         if self.render_mode == "human":
             self.render()
-        return self._observer.observe(game, self._team), reward, game.progress.is_over, False, self._info()
+        return self._observations.observe(game, self._team), reward, game.progress.is_over, False, self._info()
 
     # -- layouts -------------------------------------------------------------------------------------------------------
 
@@ -301,24 +307,26 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
         return self._chosen or self._game.layout
 
     @layout.setter
-    def layout(self, value: Any) -> None:
+    def layout(self, value: object) -> None:
         self._chosen = None if value is None else self._read(value)
 
-    def _read(self, value: Any) -> TabletopLayout:
-        known = (self._chosen, self._game.layout, self.settings.layout)
-        return value if any(value is layout for layout in known) else self.settings.read(value)
+    def _read(self, value: object) -> TabletopLayout:
+        for known in (self._chosen, self._game.layout, self.settings.layout):
+            if known is not None and value is known:
+                return known
+        return self.settings.read(value)
 
-    # -- what people and programs ask ---------------------------------------------------------------------------------
+    # -- the running game -------------------------------------------------------------------------------------------
 
     @property
     def task(self) -> TabletopTask:
-        """What is built."""
+        """The task."""
         return self.settings.task
 
     @property
     def observation_names(self) -> tuple[str, ...]:
-        """What each number of an observation is."""
-        return self._observer.names
+        """The name of each number of an observation."""
+        return self._observations.names
 
     @property
     def hand(self) -> Floats:
@@ -327,17 +335,16 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
 
     @property
     def holding(self) -> str | None:
-        """What the hand holds."""
+        """Name of the object in the hand."""
         return self._name(self._game.holding)
 
-    @property
-    def goals(self) -> tuple[str, ...]:
-        """What the person may validly reach for now; see ``info["goals"]``."""
+    def valid_goal_names(self) -> tuple[str, ...]:
+        """Names of the objects that the person may validly reach for now, as in ``info["goals"]``."""
         return self._game.goals
 
     @property
     def goal(self) -> str | None:
-        """What the person is going for, where that was said: the hand takes nothing else until this reach ends.
+        """The person's goal, where it was set: the hand takes no other object until this reach ends.
 
         Setting it shows it in observations and pictures.
 
@@ -354,7 +361,7 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
 
     @property
     def carry_to(self) -> Floats | None:
-        """``(2,)`` where what the hand holds belongs: the middle of the assembly zone if anywhere in it; or None."""
+        """``(2,)`` where the held object belongs: the middle of the assembly zone if anywhere in it; or None."""
         delivery = self._game.delivery
         if delivery is None or delivery.kind == "goal":
             return None
@@ -403,20 +410,24 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
             trail=game.reaches.points.copy(),
             time=game.time,
             crossings=game.crossings,
-            obstacles_mode=self.settings.rules.obstacles,
+            virtual_obstacles=self.settings.rules.virtual_obstacles,
         )
 
     def trajectories(self, *, participant: str = "", condition: str = "") -> list[Trajectory]:
         """The reaches of this episode that ended at a goal, in order; carrying is no reach.
 
-        Each goes from where the hand was when it was empty (or, in the task ``bins``, had taken a piece) to where it
-        took its goal, at 30 points per second. Its candidates are those of the running game when it ended, where they
-        lay then.
+        Each begins where the hand was when it became empty (or, in the task ``bins``, had taken a piece) and ends where
+        it took its goal, at 30 points per second. Its candidates are the goals of the running game when it ended, where
+        they lay then.
+
+        Args:
+            participant: Of all trajectories.
+            condition: Of all trajectories.
         """
         return self._game.reaches.trajectories(self._game.layout, participant=participant, condition=condition)
 
     def team_measures(self) -> Mapping[str, float]:
-        """Measures of the team so far; see :meth:`~legible_envs.tabletop.partner.fluency.TeamMetrics.summary`."""
+        """Measures of the team so far, by the names of :meth:`.TeamMetrics.summary`."""
         return self._team.summary()
 
     def get_keys_to_action(self) -> dict[tuple[int, ...], npt.NDArray[np.float32]]:
@@ -428,11 +439,12 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
         goals = game.goals
         return {
             "goals": goals,
+            "goal_mask": np.array([name in goals for name in game.names]),
             "candidate_set": "game",
             "start": game.progress.place,
             "stage": game.progress.stage(goals),
             "holding": self._name(game.holding),
-            "done": game.progress.num_done,
+            "num_done": game.progress.num_done,
             "crossings": game.crossings,
             "path_length": game.path_length,
             "time": game.time,
@@ -443,7 +455,7 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
     def _name(self, i: int) -> str | None:
         return self._game.names[i] if i >= 0 else None
 
-    def _check_goal(self, goal: Any, valid: tuple[str, ...]) -> None:
+    def _check_goal(self, goal: object, valid: tuple[str, ...]) -> None:
         if goal not in valid:
             raise LayoutError(
                 f"the goal must be an object that is valid now, one of {list(valid)}; got {goal!r}", rule="goal"

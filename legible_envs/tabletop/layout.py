@@ -38,8 +38,8 @@ _EDGE: Final = 1e-9
 class TabletopLayout:
     """Boxes and virtual obstacles on a table.
 
-    A value: immutable, hashable, compared by content. It admits anything that can be drawn; :meth:`validate` says
-    whether a person can work there, and the design rules of a search belong to the workspace.
+    A value: immutable, hashable, compared by content. All boxes and obstacles that can be drawn are admitted;
+    :meth:`validate` says whether a person can work there, and the design rules of a search belong to the workspace.
 
     Points are ``(x, y)`` in metres, origin front-left as the person sits, ``x`` to the right, ``y`` away from them.
     A person reaches for the centre of an object, over other objects but never across an obstacle: the centre of the
@@ -74,9 +74,9 @@ class TabletopLayout:
         self._objects = tuple(objects)
         self._obstacles = tuple(obstacles)
         self._table = Table() if table is None else table
-        for thing, kind in [(o, TableObject) for o in self._objects] + [(o, VirtualObstacle) for o in self._obstacles]:
-            if not isinstance(thing, kind):
-                raise LayoutError(f"expected a {kind.__name__}, got {thing!r}", rule="type")
+        for part, kind in [(o, TableObject) for o in self._objects] + [(o, VirtualObstacle) for o in self._obstacles]:
+            if not isinstance(part, kind):
+                raise LayoutError(f"expected a {kind.__name__}, got {part!r}", rule="type")
         names = [o.name for o in self._objects]
         repeated = sorted({n for n in names if names.count(n) > 1} | (set(names) & self._table.starts.keys()))
         if not names or repeated:
@@ -87,7 +87,7 @@ class TabletopLayout:
                 rule="name",
             )
 
-    # -- what is where -------------------------------------------------------------------------------------------------
+    # -- content -------------------------------------------------------------------------------------------------------
 
     @property
     def objects(self) -> tuple[TableObject, ...]:
@@ -151,7 +151,7 @@ class TabletopLayout:
     # -- whether a person can work here --------------------------------------------------------------------------------
 
     def validate(self) -> None:
-        """Check what makes a table usable.
+        """Check whether a person can work at this table.
 
         Raises:
             LayoutError: ``rule`` is ``"region"`` (a movable object's centre outside the region), ``"table"`` (an object
@@ -173,20 +173,20 @@ class TabletopLayout:
     def _check_objects(self) -> None:
         x0, y0, x1, y1 = self._table.region
         width, depth = self._table.size
-        for thing in self._objects:
-            x, y = thing.at
-            if thing.movable and not (x0 - _EDGE <= x <= x1 + _EDGE and y0 - _EDGE <= y <= y1 + _EDGE):
+        for obj in self._objects:
+            x, y = obj.at
+            if obj.movable and not (x0 - _EDGE <= x <= x1 + _EDGE and y0 - _EDGE <= y <= y1 + _EDGE):
                 raise LayoutError(
-                    f"{thing.name} at ({x:g}, {y:g}) lies outside the region x {x0:g}…{x1:g}, y {y0:g}…{y1:g}",
+                    f"{obj.name} at ({x:g}, {y:g}) lies outside the region x {x0:g}…{x1:g}, y {y0:g}…{y1:g}",
                     rule="region",
                 )
-            corners = thing.corners
+            corners = obj.corners
             if (corners < -_EDGE).any() or (corners > np.array([width, depth]) + _EDGE).any():
                 raise LayoutError(
-                    f"{thing.name} at ({x:g}, {y:g}) sticks out of the table of {width:g} x {depth:g} m", rule="table"
+                    f"{obj.name} at ({x:g}, {y:g}) sticks out of the table of {width:g} x {depth:g} m", rule="table"
                 )
-        corners_of = [thing.corners for thing in self._objects]
-        reach = [math.hypot(*thing.size) / 2 for thing in self._objects]
+        corners_of = [obj.corners for obj in self._objects]
+        reach = [math.hypot(*obj.size) / 2 for obj in self._objects]
         for i, a in enumerate(self._objects):
             for j in range(i):
                 b = self._objects[j]
@@ -196,10 +196,10 @@ class TabletopLayout:
 
     def _check_obstacles(self) -> None:
         for number, obstacle in enumerate(self._obstacles, 1):
-            for thing in self._objects:
-                if rectangles_overlap(obstacle.corners, thing.corners):
+            for obj in self._objects:
+                if rectangles_overlap(obstacle.corners, obj.corners):
                     raise LayoutError(
-                        f"obstacle {number} at {obstacle.at} lies over {thing.name} at {thing.at}", rule="obstacle"
+                        f"obstacle {number} at {obstacle.at} lies over {obj.name} at {obj.at}", rule="obstacle"
                     )
 
     def _check_paths(self) -> None:
@@ -215,10 +215,10 @@ class TabletopLayout:
                     f"half-width of {hand:g} m",
                     rule="start",
                 )
-        for thing, is_free in zip(self._objects, self.paths.is_free(self.centres), strict=True):
+        for obj, is_free in zip(self._objects, self.paths.is_free(self.centres), strict=True):
             if not is_free:
                 raise LayoutError(
-                    f"{thing.name} at {thing.at} lies inside an obstacle grown by the hand's half-width of {hand:g} m",
+                    f"{obj.name} at {obj.at} lies inside an obstacle grown by the hand's half-width of {hand:g} m",
                     rule="covered",
                 )
         lengths = self.paths.lengths(start_points)
@@ -262,7 +262,7 @@ class TabletopLayout:
                 :class:`~legible_envs.tabletop.objects.Table`.
 
         Raises:
-            LayoutError: Another schema, missing or unknown keys, or what the constructors reject.
+            LayoutError: Another schema, missing or unknown keys, or values that the constructors reject.
         """
         if not isinstance(data, Mapping):
             raise LayoutError(f"a layout must be a mapping, got {type(data).__name__}", rule="schema")

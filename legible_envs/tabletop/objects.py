@@ -1,4 +1,4 @@
-"""What lies on a table: the table itself, boxes to reach for, and virtual obstacles. Plain values, in metres."""
+"""The table, the boxes on it to reach for, and virtual obstacles: plain values, in metres."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def numbers(value: Any, count: int, what: str, *, positive: bool = False) -> tup
     """``count`` finite numbers as a tuple.
 
     Raises:
-        LayoutError: Anything else; ``what`` says where.
+        LayoutError: Another value; ``what`` says where.
     """
     is_list = isinstance(value, Iterable) and not isinstance(value, (str, bytes, Mapping))
     found = list(value) if is_list else [value]
@@ -82,7 +82,7 @@ class TableObject:
         name: Unique name; the goal's name in the task.
         at: ``(x, y)`` of its centre in metres.
         colour: Any CSS-like colour name.
-        shape: What is drawn on it, such as ``"circle"``.
+        shape: The shape drawn on it, such as ``"circle"``.
         size: ``(length, width)`` in metres; a cube of 4.5 cm by default.
         angle: Direction of its length in radians, counter-clockwise from the x-axis.
         movable: Whether a design may put it elsewhere.
@@ -141,7 +141,7 @@ class VirtualObstacle:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """The table: where things may lie, where they are built together, and where the hand starts.
+    """The table: where objects may lie, where they are built together, and where the hand starts.
 
     Attributes:
         size: ``(width, depth)`` in metres; the person sits at ``y = 0``.

@@ -1,4 +1,4 @@
-"""What an agent at the table observes: a vector, as long as the environment lives the same, with a name per number."""
+"""Observations of the table: a vector of fixed length with a name for every number."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from legible_envs.tabletop.layout import TabletopLayout
 from legible_envs.tabletop.partner.team import GRIPPER_SPEED, Team
 from legible_envs.tabletop.task import TabletopTask
 
-__all__ = ["Observer"]
+__all__ = ["ObservationBuilder"]
 
 _HAND = ("hand x", "hand y", "hand velocity x", "hand velocity y", "hand is low", "hand holds an object")
 _PLACES = ("carry to x", "carry to y", "carry to a point", "reach start x", "reach start y")
@@ -22,7 +22,7 @@ _OBSTACLE = ("active", "x", "y", "cos", "sin", "length", "width")
 _ROBOT = ("gripper x", "gripper y", "gripper velocity x", "gripper velocity y")
 
 
-class Observer:
+class ObservationBuilder:
     """Writes observations of a game; :class:`~legible_envs.tabletop.env.TabletopEnv` lists the numbers.
 
     Args:
@@ -31,8 +31,8 @@ class Observer:
         has_robot: Whether a robot takes part.
 
     Attributes:
-        names: What each number is.
-        space: Where they lie.
+        names: The name of each number.
+        space: The observation space.
     """
 
     def __init__(self, task: TabletopTask, max_obstacles: int, has_robot: bool) -> None:
@@ -62,7 +62,7 @@ class Observer:
         return low, high
 
     def enter(self, layout: TabletopLayout) -> None:
-        """Note what does not change during an episode."""
+        """Note the obstacles, which do not change during an episode."""
         self._fixed[:] = 0.0
         rows = self._fixed[self._obstacles].reshape(self._max_obstacles, len(_OBSTACLE))
         for row, obstacle in zip(rows, layout.obstacles, strict=False):
@@ -96,5 +96,5 @@ class Observer:
             rows[game.index[game.goal], 9] = 1.0
         if self._has_robot and team.gripper is not None:
             values[-4:] = (*team.gripper, team.velocity[0] / GRIPPER_SPEED, team.velocity[1] / GRIPPER_SPEED)
-        # What is pushed against the table's edge may stick out a little, and an obstacle may lie anywhere.
+        # An object pushed against the table's edge may stick out a little, and an obstacle may lie anywhere.
         return np.clip(values.astype(np.float32), self.space.low, self.space.high)

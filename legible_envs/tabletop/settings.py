@@ -1,13 +1,12 @@
-"""What a table environment was asked to be: arguments checked once."""
+"""The arguments of the table environment, checked once."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from functools import cache
 from itertools import product
 from pathlib import Path
-from typing import Any, Final
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -18,10 +17,10 @@ from legible_envs.tabletop.layout import TabletopLayout
 from legible_envs.tabletop.objects import Point, point
 from legible_envs.tabletop.task import TabletopTask
 
-__all__ = ["HAND_SPEED", "TableSettings", "keys_to_action", "read_layout", "read_start", "read_task"]
+__all__ = ["HAND_SPEED", "Start", "TableSettings", "keys_to_action", "read_layout", "read_start", "read_task"]
 
 HAND_SPEED: Final = 0.5
-"""How fast a key moves the hand, m/s: too fast to take anything, so that one takes by letting go."""
+"""How fast a key moves the hand, m/s: too fast to take an object, so that players take by letting go."""
 
 _SETS: Final = (
     {(0, 1): 1073741906, (0, -1): 1073741905, (1, 0): 1073741903, (-1, 0): 1073741904},  # arrows
@@ -32,8 +31,8 @@ ELSEWHERE: Final = "elsewhere"
 """Name of a start that is none of the table's."""
 
 
-def read_task(value: Any) -> TabletopTask:
-    """Turn whatever describes a task into one.
+def read_task(value: object) -> TabletopTask:
+    """A task from any description of one.
 
     Args:
         value: A :class:`TabletopTask`, the name of one that comes with the package, the path of a YAML file, or a
@@ -50,20 +49,14 @@ def read_task(value: Any) -> TabletopTask:
     if isinstance(value, Path) or (isinstance(value, str) and value.endswith((".yaml", ".yml"))):
         return TabletopTask.from_yaml(value)
     if isinstance(value, str):
-        return _named(value)
+        return TabletopTask.named(value)
     raise TaskError(
         f"`task` must be a TabletopTask, a name, a path or a mapping, got {type(value).__name__}: {value!r}"
     )
 
 
-@cache
-def _named(name: str) -> TabletopTask:
-    # A task is immutable, and counting its states takes long where there are many.
-    return TabletopTask.named(name)
-
-
-def read_layout(value: Any, task: TabletopTask, max_obstacles: int) -> TabletopLayout:
-    """Turn whatever describes an arrangement into a valid one of a task's objects.
+def read_layout(value: object, task: TabletopTask, max_obstacles: int) -> TabletopLayout:
+    """A valid arrangement of a task's objects from any description of one.
 
     Args:
         value: A :class:`TabletopLayout`, JSON text or the path of a JSON file, a mapping as
@@ -93,7 +86,7 @@ def read_layout(value: Any, task: TabletopTask, max_obstacles: int) -> TabletopL
     return layout
 
 
-def _numbers(value: Any) -> Any:
+def _numbers(value: object) -> npt.NDArray[np.float64]:
     try:
         array = np.asarray(value)
         if array.dtype.kind not in "iuf":
@@ -115,10 +108,10 @@ def _check_of_task(layout: TabletopLayout, task: TabletopTask, max_obstacles: in
         raise LayoutError(
             f"the layout's table {layout.table} is not that of task {task.name!r}, {ours.table}", rule="task"
         )
-    for thing, known in zip(layout.objects, ours.objects, strict=True):
-        if thing.size != known.size:
+    for obj, known in zip(layout.objects, ours.objects, strict=True):
+        if obj.size != known.size:
             raise LayoutError(
-                f"{thing.name} measures {thing.size} m in the layout and {known.size} m in task {task.name!r}",
+                f"{obj.name} measures {obj.size} m in the layout and {known.size} m in task {task.name!r}",
                 rule="task",
             )
     if len(layout.obstacles) > max_obstacles:
@@ -129,7 +122,14 @@ def _check_of_task(layout: TabletopLayout, task: TabletopTask, max_obstacles: in
         )
 
 
-def read_start(value: Any, layout: TabletopLayout) -> tuple[str, Point]:
+class Start(NamedTuple):
+    """Where the hand starts: a name and a point."""
+
+    name: str
+    at: Point
+
+
+def read_start(value: object, layout: TabletopLayout) -> Start:
     """Name and point of where the hand starts.
 
     Args:
@@ -155,7 +155,7 @@ def read_start(value: Any, layout: TabletopLayout) -> tuple[str, Point]:
             f"the start at {at} lies inside an obstacle grown by the hand's half-width of {layout.table.hand:g} m",
             rule="start",
         )
-    return name, at
+    return Start(name, at)
 
 
 class TableSettings:
@@ -164,9 +164,9 @@ class TableSettings:
     def __init__(
         self,
         *,
-        task: Any,
-        layout: Any,
-        obstacles: str,
+        task: object,
+        layout: object,
+        virtual_obstacles: str,
         contact: str,
         max_obstacles: int,
         max_speed: float,
@@ -179,15 +179,15 @@ class TableSettings:
         threshold: float,
     ) -> None:
         self.task = read_task(task)
-        if obstacles not in ("hard", "soft"):
-            raise ValueError(f"`obstacles` must be 'hard' or 'soft', got {obstacles!r}")
+        if virtual_obstacles not in ("hard", "soft"):
+            raise ValueError(f"`virtual_obstacles` must be 'hard' or 'soft', got {virtual_obstacles!r}")
         if contact not in CONTACTS:
             raise ValueError(f"`contact` must be one of {CONTACTS}, got {contact!r}")
         if isinstance(max_obstacles, bool) or not isinstance(max_obstacles, int) or max_obstacles < 0:
             raise ValueError(f"`max_obstacles` must be an integer >= 0, got {max_obstacles!r}")
         self.max_obstacles = max_obstacles
         self.rules = GameRules(
-            obstacles=obstacles,  # type: ignore[arg-type]
+            virtual_obstacles=virtual_obstacles,  # type: ignore[arg-type]
             contact=contact,  # type: ignore[arg-type]
             max_speed=_number("max_speed", max_speed, least=1e-3),
             slow_speed=_number("slow_speed", slow_speed, least=1e-3),
@@ -200,18 +200,19 @@ class TableSettings:
         self.threshold = _number("threshold", threshold, most=1.0)
         self.layout = self.task.layout if layout is None else self.read(layout)
 
-    def read(self, layout: Any) -> TabletopLayout:
-        """A layout this environment can play; see :func:`read_layout`."""
+    def read(self, layout: object) -> TabletopLayout:
+        """A layout that this environment can play, from any form that :func:`read_layout` takes."""
         return read_layout(layout, self.task, self.max_obstacles)
 
 
-def _number(name: str, value: Any, least: float = 0.0, most: float = math.inf) -> float:
-    ok = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
-    if not ok or not math.isfinite(value) or not least <= value <= most:
+def _number(name: str, value: object, least: float = 0.0, most: float = math.inf) -> float:
+    is_number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
+    number = float(value) if is_number else math.nan  # type: ignore[arg-type]
+    if not math.isfinite(number) or not least <= number <= most:
         bounds = "" if math.isinf(least) else f" >= {least:g}"
         bounds += "" if math.isinf(most) else f" and <= {most:g}"
         raise ValueError(f"`{name}` must be a finite number{bounds}, got {value!r}")
-    return float(value)
+    return number
 
 
 def keys_to_action(max_speed: float) -> dict[tuple[int, ...], npt.NDArray[np.float32]]:
@@ -219,7 +220,7 @@ def keys_to_action(max_speed: float) -> dict[tuple[int, ...], npt.NDArray[np.flo
     actions: dict[tuple[int, ...], npt.NDArray[np.float32]] = {}
     for keys in _SETS:
         for x, y in product((-1, 0, 1), repeat=2):
-            pressed = [key for way, key in keys.items() if way in ((x, 0), (0, y)) and way != (0, 0)]
+            pressed = [key for direction, key in keys.items() if direction in ((x, 0), (0, y))]
             if pressed:
                 velocity = np.array([x, y]) / math.hypot(x, y) * min(HAND_SPEED / max_speed, 1.0)
                 actions[tuple(sorted(pressed))] = velocity.astype(np.float32)

@@ -1,16 +1,18 @@
-"""Tasks on a table: what to build from which objects, in which order, read from a YAML file."""
+"""Tasks on a table: which objects to put where, in which order, read from a YAML file."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
-from legible_envs.errors import TaskError
+from legible_envs.errors import LayoutError, TaskError
 from legible_envs.tabletop.layout import TabletopLayout
 from legible_envs.tabletop.objects import Point, point, rectangle, rectangles_overlap
 from legible_envs.tasks import TaskGraph
@@ -24,6 +26,13 @@ def task_names() -> tuple[str, ...]:
     """Names of the tasks that come with the package."""
     folder = resources.files("legible_envs.tabletop") / "tasks"
     return tuple(sorted(entry.name.removesuffix(".yaml") for entry in folder.iterdir() if entry.name.endswith(".yaml")))
+
+
+class _Placed(NamedTuple):
+    """An object in the configuration and its ``(4, 2)`` corners there."""
+
+    name: str
+    corners: npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -74,20 +83,20 @@ class TabletopTask:
             {name: point(at, f"the place of {name!r}") for name, at in self.configuration.items()},
         )
         width, depth = self.layout.table.size
-        placed: list[tuple[str, Any]] = []
+        placed: list[_Placed] = []
         for name, at in self.configuration.items():
             if name not in self.layout.goals:
                 raise TaskError(f"the configuration places {name!r}; the objects are {list(self.layout.goals)}")
-            thing = self.layout.objects[self.layout.index(name)]
-            if not thing.movable:
+            obj = self.layout.objects[self.layout.index(name)]
+            if not obj.movable:
                 raise TaskError(f"the configuration places {name!r}, which is not movable")
-            corners = rectangle(*at, thing.angle, *thing.size)
+            corners = rectangle(*at, obj.angle, *obj.size)
             if (corners < -1e-9).any() or (corners > np.array([width, depth]) + 1e-9).any():
                 raise TaskError(f"the configuration places {name!r} at {at}, off the table of {width:g} x {depth:g} m")
-            for other, taken in placed:
-                if rectangles_overlap(corners, taken):
-                    raise TaskError(f"the configuration places {other!r} and {name!r} over each other")
-            placed.append((name, corners))
+            for other in placed:
+                if rectangles_overlap(corners, other.corners):
+                    raise TaskError(f"the configuration places {other.name!r} and {name!r} over each other")
+            placed.append(_Placed(name, corners))
 
     def __hash__(self) -> int:
         return hash((self.name, self.layout, self.graph, tuple(self.configuration.items())))
@@ -96,15 +105,31 @@ class TabletopTask:
 
     @classmethod
     def named(cls, name: str) -> TabletopTask:
-        """One of the tasks that come with the package, see :func:`task_names`.
+        """One of the tasks that come with the package, whose names :func:`task_names` lists.
 
         Raises:
             TaskError: There is none of this name.
         """
         if name not in task_names():
             raise TaskError(f"no task {name!r}; there are {list(task_names())}, or give the path of a YAML file")
-        text = (resources.files("legible_envs.tabletop") / "tasks" / f"{name}.yaml").read_text(encoding="utf-8")
-        return cls.from_yaml(text)
+        return _packaged(name)
+
+    @classmethod
+    def for_layout(cls, layout: TabletopLayout) -> TabletopTask:
+        """The task of the package that has a layout's objects and starts, by their names.
+
+        Raises:
+            LayoutError: There is none.
+        """
+        for name in task_names():
+            task = cls.named(name)
+            if (task.layout.goals, tuple(task.layout.table.starts)) == (layout.goals, tuple(layout.table.starts)):
+                return task
+        raise LayoutError(
+            f"no task of the package ({', '.join(task_names())}) has the objects {list(layout.goals)} and the starts "
+            f"{list(layout.table.starts)}: name the task",
+            rule="object",
+        )
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> TabletopTask:
@@ -115,8 +140,8 @@ class TabletopTask:
                 ``table``, ``configuration`` and ``schema`` (1).
 
         Raises:
-            TaskError: A missing or unknown key, or anything this class or the graph rejects.
-            LayoutError: Anything the layout rejects.
+            TaskError: A missing or unknown key, or data that this class or the graph rejects.
+            LayoutError: Data that the layout rejects.
         """
         keys = {"schema", "name", "table", "objects", "configuration", "task"}
         if not isinstance(data, Mapping):
@@ -172,3 +197,10 @@ class TabletopTask:
         if path is not None:
             Path(path).write_text(text, encoding="utf-8")
         return text
+
+
+@cache
+def _packaged(name: str) -> TabletopTask:
+    # A task is immutable, and counting its states takes long where there are many.
+    text = (resources.files("legible_envs.tabletop") / "tasks" / f"{name}.yaml").read_text(encoding="utf-8")
+    return TabletopTask.from_yaml(text)

@@ -26,7 +26,7 @@ class StraightLineBayesian(PlacePredictor):
     else where reaches ended in ``fit``. Over a :class:`~legible_envs.tabletop.TabletopLayout` it leads round the
     obstacles to the object of that name: a hand inside an obstacle counts as being at the nearest free point, and
     where there is no path the straight line counts, so that every cost is finite. This is the belief of
-    :class:`~legible_envs.tabletop.partner.belief.EqOneBelief`.
+    :class:`~legible_envs.tabletop.partner.belief.GoalBelief`.
 
     Args:
         beta: Rationality, per metre. Which goal is on top does not depend on it.
@@ -65,14 +65,14 @@ class StraightLineBayesian(PlacePredictor):
         """
         if not self.obstacles or not isinstance(trajectory.layout, TabletopLayout):
             return super().weigh_trajectory(trajectory)
-        from legible_envs.tabletop.partner.belief import EqOneBelief
+        from legible_envs.tabletop.partner.belief import GoalBelief
 
         self._check_beta()
         if trajectory.is_grid or trajectory.states.shape[1] != 2:
             raise ValueError(
                 f"expected positions (x, y) on a table, got {trajectory.states.shape[1]}-d {trajectory.states.dtype}"
             )
-        belief = EqOneBelief(
+        belief = GoalBelief(
             trajectory.layout,
             self.beta,
             start=trajectory.states[0],

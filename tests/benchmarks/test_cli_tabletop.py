@@ -210,7 +210,7 @@ def test_recorded_reaches_are_read(run: Path, tmp_path: Path) -> None:
     from legible_envs.tabletop.humans import sample_person, simulate_task
 
     layout, rng = TabletopLayout.from_json(run / "best.json"), np.random.default_rng(0)
-    reaches = simulate_task(TabletopTask.named("columns"), layout, sample_person(rng), rng)
+    reaches = simulate_task(layout, sample_person(rng), rng, task=TabletopTask.named("columns"))
     save_trajectories(tmp_path / "reaches.npz", reaches)
     result = legible("score", run / "best.json", "--trajectories", tmp_path / "reaches.npz")
     assert result.exit_code == 0, result.output

@@ -149,7 +149,7 @@ def people() -> Figures:
     kept: Figures = {}
     workspace, task = kitchen_workspace(), TabletopTask.named("columns")
     walks = cooks(workspace.decode(workspace.sample(1, np.random.default_rng(9))[0]), 4, np.random.default_rng(9))
-    reaches = reachers(task, task.layout, 4, np.random.default_rng(9))
+    reaches = reachers(task.layout, 4, np.random.default_rng(9), task=task)
     for kind, trajectories, names in (
         ("walks", walks, ("shortest-distance", "bayesian", "maxent-irl", "grid-ngram", "grid-knn", "grid-logistic")),
         ("reaches", reaches, ("reach-gaussian", "reach-bayesian", "reach-logistic")),

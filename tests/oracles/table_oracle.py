@@ -1,4 +1,4 @@
-"""Shortest paths and legibility on a table, slow and obviously right: shapely for visibility, networkx for the ways."""
+"""Shortest paths and legibility on a table, slow and obviously right, by shapely and networkx."""
 
 import itertools
 import math
@@ -29,7 +29,7 @@ def grown(obstacle, by):
 
 
 class PathOracle:
-    """All pairs of points are tried; no corner is dropped but those a hand cannot be at.
+    """All pairs of points are tried; only corners where a hand cannot be are dropped.
 
     ``crossings`` also lets paths bend where sides of obstacles meet each other or the edge of the table.
     """
@@ -57,8 +57,8 @@ class PathOracle:
     def clear(self, p, q):
         if p == q:
             return self.free(p)
-        way = shapely.LineString([p, q])
-        return not any(piece.intersects(way) for piece in self.pieces)
+        line = shapely.LineString([p, q])
+        return not any(piece.intersects(line) for piece in self.pieces)
 
     def graph(self, start):
         points = [("start", start), *(("corner", c) for c in self.corners), *(("goal", g) for g in self.goals)]

@@ -40,11 +40,11 @@ _EVERY: Final = 7
 def boards(best: pd.DataFrame) -> Any:
     """The layouts shown, with what is built and where the goal of a reach is in doubt."""
     from legible_envs.tabletop import TabletopLayout
-    from legible_envs.tabletop.rendering import draw_boards
+    from legible_envs.tabletop.rendering import draw_panels
     from legible_envs.tabletop.settings import read_task
 
     layouts = {row["condition"]: TabletopLayout.from_json(row["json"]) for row in best.to_dict("records")}
-    return draw_boards(
+    return draw_panels(
         {str(name): layout for name, layout in layouts.items()}, read_task("columns"), width=480, columns=4
     )
 

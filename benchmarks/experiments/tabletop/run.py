@@ -155,7 +155,7 @@ def simulate(cell: dict[str, Any]) -> list[Trajectory]:
     labels = {"condition": cell["condition"], "layout_name": f"{cell['condition']}/{cell['layout']}"}
     found = []
     for name, person, rng in _people(cell):
-        found += simulate_task(task, layout, person, rng, participant=name, **labels)
+        found += simulate_task(layout, person, rng, task=task, participant=name, **labels)
     return [reach for reach in found if len(reach.candidates) > 1]
 
 
@@ -228,15 +228,15 @@ def play_with_robot(cell: dict[str, Any]) -> Rows:
     rows: Rows = []
     for name, person, rng in _people(cell):
         for turn in range(cell["rounds"]):
-            player, over = ReachingPlayer(person, rng), False
-            _, info = env.reset(seed=turn)
+            player, over = ReachingPlayer(env, person, rng), False
+            obs, info = env.reset(seed=turn)
             while not over:
-                _, _, terminated, truncated, info = env.step(player(env))
+                obs, _, terminated, truncated, info = env.step(player(obs, info))
                 over = terminated or truncated
             measures = dict(env.unwrapped.team_measures()) if robot else {}  # type: ignore[attr-defined]
             if not robot:
                 measures["completion_time"] = info["time"] if terminated else None
-            who = {"participant": name, "round": turn, "done": info["done"], "path_length": info["path_length"]}
+            who = {"participant": name, "round": turn, "done": info["num_done"], "path_length": info["path_length"]}
             rows.append(who | measures)
     env.close()
     return rows

@@ -76,7 +76,7 @@ class Reader:
 
 
 READERS: Final = (
-    Reader("Eq. 1", "eq1"),
+    Reader("Eq. 1", "bayesian"),
     Reader("Gaussian", "predictors.reaching.gaussian:TimeSeriesGaussian"),
     Reader("reads nothing", "predictors.uniform:UniformPredictor"),
     Reader("alone", ""),

@@ -469,7 +469,7 @@ class TabletopWorkspace(Workspace):
         """
         from legible_envs.tabletop.humans.simulation import simulate_participants
 
-        return simulate_participants(self.task, self._one(genome), participants, rng, **settings)
+        return simulate_participants(self._one(genome), participants, rng, task=self.task, **settings)
 
     # -- configuration -------------------------------------------------------------------------------------------------
 

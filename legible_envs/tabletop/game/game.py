@@ -1,4 +1,4 @@
-"""The rules of a table in play: a hand that moves, pushes, takes, carries and places, and what counts as done."""
+"""The rules of a table in play: a hand moves, pushes, takes, carries and places objects."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ _NO_BOXES: Final = np.empty((0, 6))
 
 @dataclass(frozen=True, slots=True)
 class GameRules:
-    """What can be chosen about the game; see :class:`~legible_envs.tabletop.env.TabletopEnv` for what it means."""
+    """The options of the game; :class:`~legible_envs.tabletop.env.TabletopEnv` documents them."""
 
-    obstacles: Literal["hard", "soft"] = "hard"
+    virtual_obstacles: Literal["hard", "soft"] = "hard"
     contact: Literal["slow", "always", "never"] = "slow"
     max_speed: float = 3.0
     slow_speed: float = 0.2
@@ -46,20 +46,20 @@ class TableGame:
     """One table in play.
 
     Args:
-        task: What is built.
-        rules: How.
+        task: The task.
+        rules: The options of the game.
 
     Attributes:
-        progress: What is done and what may be reached for.
-        physics: Where the objects are.
-        reaches: Where the hand was.
+        progress: Subtasks done, and goals that are valid.
+        physics: Positions of the objects.
+        reaches: The path of the hand.
         hand: ``(x, y)`` in metres.
         velocity: ``(x, y)`` in m/s, of the last step.
         is_low: Whether the hand is at the height of the objects.
-        holding: Index of what the hand holds, or -1.
+        holding: Index of the object in the hand, or -1.
         delivery: Where that belongs, or None.
         status: ``(n,)`` int, 0 to 3: free, in the hand, in the gripper, placed.
-        goal: What the person is going for, where that was said.
+        goal: The person's goal, where it was set.
         time: Seconds since the episode began.
         path_length: Metres the hand has moved.
         crossings: Virtual obstacles crossed.
@@ -74,7 +74,7 @@ class TableGame:
         self.index = {name: i for i, name in enumerate(names)}
         self.names = names
         self._loose = np.array([self.progress.carries(name) for name in names])
-        self._half_sizes = np.array([thing.size for thing in task.layout.objects]) / 2
+        self._half_sizes = np.array([obj.size for obj in task.layout.objects]) / 2
         self._distances = np.empty(len(names))
         self.begin(task.layout, task.layout.place(task.graph.start), task.graph.start)
 
@@ -83,10 +83,10 @@ class TableGame:
         self.layout = layout
         paths = layout.paths
         self._size = paths.size
-        self._grown = paths.boxes if self.rules.obstacles == "hard" else _NO_BOXES
+        self._grown = paths.boxes if self.rules.virtual_obstacles == "hard" else _NO_BOXES
         drawn = paths.boxes.copy()
         drawn[:, 4:] -= layout.table.hand
-        self._drawn = drawn if self.rules.obstacles == "soft" else _NO_BOXES
+        self._drawn = drawn if self.rules.virtual_obstacles == "soft" else _NO_BOXES
         self._radius = layout.table.hand
         self.physics = TablePhysics(layout, self._radius, DT, self._loose)
         self.progress.restart()
@@ -106,7 +106,7 @@ class TableGame:
         self.reaches.begin(np.array(self.hand), 0.0)
         self._look()
 
-    # -- what is ------------------------------------------------------------------------------------------------------
+    # -- state --------------------------------------------------------------------------------------------------------
 
     @property
     def time(self) -> float:
@@ -125,7 +125,7 @@ class TableGame:
 
     @property
     def goals(self) -> tuple[str, ...]:
-        """What the person may validly reach for now: nothing while they carry an object to a place that is given."""
+        """Objects that the person may validly reach for now; none while they carry one to a given place."""
         if self.delivery is not None and self.delivery.kind != "goal":
             return ()
         wanted = "touch" if self.delivery is not None else None
@@ -137,7 +137,7 @@ class TableGame:
 
     @property
     def robot_goals(self) -> tuple[str, ...]:
-        """What a robot may validly take now: what lies free and has a point it belongs to."""
+        """Objects that a robot may validly take now: those that lie free and belong to a point."""
         return tuple(
             name
             for name, delivery in self.progress.goals.items()
@@ -146,7 +146,7 @@ class TableGame:
 
     @property
     def robot_holding(self) -> int:
-        """Index of what the gripper holds, or -1."""
+        """Index of the object in the gripper, or -1."""
         return -1 if self._robot_delivery is None else self.index[self._robot_delivery.goal]
 
     # -- the person ----------------------------------------------------------------------------------------------------
@@ -198,7 +198,7 @@ class TableGame:
             self.physics.settle()
 
     def _look(self) -> None:
-        """See what is where."""
+        """Measure the distances of the objects to the hand."""
         touch_distances(self.physics.positions, self.physics.angles, self._half_sizes, *self.hand, self._distances)
         self._on_table = self.status == FREE
 
@@ -224,7 +224,7 @@ class TableGame:
         self.reaches.finish(self.progress.place, delivery.goal, goals, self.positions[rows])
         self.goal = None
         self.progress.begin(delivery)
-        if self.delivery is not None:  # what is held stays here, as in a bin
+        if self.delivery is not None:  # the held object stays here, as in a bin
             self.status[self.holding] = PLACED
             self.holding, self.delivery = -1, None
         elif delivery.kind != "touch":
@@ -238,7 +238,7 @@ class TableGame:
         return 0
 
     def _place(self, delivery: Delivery) -> int:
-        """Put down what is held if it belongs here."""
+        """Put down the held object if it belongs here."""
         i = self.holding
         if delivery.at is not None:
             if math.dist(self.hand, delivery.at) > self.rules.release_distance:
@@ -288,7 +288,7 @@ class TableGame:
         return True
 
     def robot_put(self, at: tuple[float, float], near: float) -> int:
-        """Open the gripper at a point: what it held stays in its place if that is near, else it lies free again.
+        """Open the gripper at a point: the object stays in its place if that is near, else it lies free again.
 
         Returns:
             How many subtasks this finished.
@@ -310,10 +310,10 @@ class TableGame:
         return int(is_there)
 
     def carry_along(self, at: tuple[float, float]) -> None:
-        """What the gripper holds goes where it goes."""
+        """Move the object in the gripper along with it."""
         if self._robot_delivery is not None:
             self.positions[self.robot_holding] = at
 
     def statuses(self) -> tuple[str, ...]:
-        """What becomes of each object, in words."""
+        """The status of each object, in words."""
         return tuple(STATUSES[code] for code in self.status)

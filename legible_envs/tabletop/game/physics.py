@@ -30,10 +30,10 @@ HAND, OBJECT, FIXED = 1, 2, 4
 class TablePhysics:
     """Objects that slide with dry friction when they are pushed, cannot leave the table, and do not feel obstacles.
 
-    While everything rests and nothing touches anything, no time is spent: the bodies are stepped only while one moves
-    or the hand is among them. The result of a sequence of calls is exactly the same every time on one machine, and
-    copies, pickled ones included, go on exactly as the original would: they repeat what has happened since all rested,
-    because the solver keeps contacts between steps that cannot be read.
+    The bodies are stepped only while one moves or the hand is among them; a table at rest costs no time. The result of
+    a sequence of calls is exactly the same every time on one machine, and copies, pickled ones included, go on exactly
+    as the original would: they repeat what has happened since all rested, because the solver keeps contacts between
+    steps that cannot be read.
 
     Args:
         layout: Where the objects lie at first.
@@ -48,8 +48,8 @@ class TablePhysics:
 
     def __init__(self, layout: TabletopLayout, hand: float, dt: float, loose: npt.NDArray[np.bool_]) -> None:
         self.positions = layout.centres.copy()
-        self.angles = np.array([thing.angle for thing in layout.objects])
-        self._sizes = tuple(thing.size for thing in layout.objects)
+        self.angles = np.array([obj.angle for obj in layout.objects])
+        self._sizes = tuple(obj.size for obj in layout.objects)
         self._table = layout.table.size
         self._hand_radius = hand
         self._dt = dt
@@ -61,10 +61,10 @@ class TablePhysics:
 
     @property
     def is_resting(self) -> bool:
-        """Whether nothing moves."""
+        """Whether all objects are at rest."""
         return self._resting
 
-    # -- what happens --------------------------------------------------------------------------------------------------
+    # -- events --------------------------------------------------------------------------------------------------------
 
     def take(self, i: int) -> None:
         """Take an object off the table."""
@@ -79,14 +79,14 @@ class TablePhysics:
         self.positions[i] = at
         self.angles[i] = angle
         self._add(i)
-        self._resting = False  # something may lie where it was put
+        self._resting = False  # another object may lie there
 
     def advance(self, hand: tuple[float, float], velocity: tuple[float, float], is_low: bool) -> None:
         """Advance by ``dt``.
 
         Args:
             hand: Where the hand is at first.
-            velocity: Its velocity in m/s, which nothing on the table changes.
+            velocity: Its velocity in m/s, which no object changes.
             is_low: Whether the hand is at the height of the objects, and pushes them.
         """
         self._note("advance", hand, velocity, is_low)
@@ -105,7 +105,7 @@ class TablePhysics:
         self._resting = fastest < REST_SPEED
 
     def settle(self) -> None:
-        """Forget how things came to rest, so that copies have little to repeat; only while they do rest."""
+        """Forget how objects came to rest, so that copies have little to repeat; only while they do rest."""
         if self._resting and len(self._log) > LOG_LIMIT:
             self._log.clear()
             self._build()
@@ -113,7 +113,7 @@ class TablePhysics:
     # -- bodies --------------------------------------------------------------------------------------------------------
 
     def _build(self) -> None:
-        """A new space from what is where."""
+        """A new space from the present positions."""
         self._origin = (self.positions.copy(), self.angles.copy(), list(self._kinds))
         self._space = space = pymunk.Space()
         space.iterations = 15

@@ -1,4 +1,4 @@
-"""How far a task on the table is: what may be reached for next, and where what is taken belongs."""
+"""Progress of a task on the table: which goals are valid next, and where a taken object belongs."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ ASSEMBLY: Final = "assembly"
 
 @dataclass(frozen=True, slots=True)
 class Delivery:
-    """What becomes of an object that was reached.
+    """Where an object belongs after it was reached.
 
     Attributes:
         number: The kind of subtask this belongs to, an index into the task's ``states.classes``.
         goal: The object.
-        kind: ``"touch"``: reaching it is all; ``"slot"``: it is carried to a point; ``"zone"``: it is carried anywhere
+        kind: ``"touch"``: it is only reached; ``"slot"``: it is carried to a point; ``"zone"``: it is carried anywhere
             into the assembly zone; ``"goal"``: it is carried to the next goal that is reached, such as a bin.
         at: The point it is carried to, for ``"slot"``.
     """
@@ -33,11 +33,11 @@ class Delivery:
 
 
 class TaskProgress:
-    """Counts what is done and begun, by one or several agents.
+    """Counts the subtasks done and begun, by one or several agents.
 
-    A subtask is *begun* when its goal is taken, *done* when the goal is where it belongs. What waits for a subtask may
-    be begun when that is done; nobody may begin what somebody else has begun. A subtask is begun only if the task can
-    still be finished afterwards.
+    A subtask is *begun* when its goal is taken, *done* when the goal is where it belongs. A subtask that
+    waits for others may be begun when they are done, and only once. A subtask is begun only if the task can still be
+    finished afterwards.
 
     Where an object that is taken belongs: to its place in the task's ``configuration``; else, if the subtask names
     places to go to afterwards, to the last of these (anywhere in the assembly zone if that is ``assembly``); else, if
@@ -60,9 +60,9 @@ class TaskProgress:
     def __init__(self, task: TabletopTask) -> None:
         self.task = task
         self._space = task.graph.states
-        self._ways: dict[tuple[int, ...], bool] = {}
-        for (done, _), ways in self._space.completions.items():
-            self._ways[done] = self._ways.get(done, False) or ways > 0
+        self._can_finish: dict[tuple[int, ...], bool] = {}
+        for (done, _), orders in self._space.completions.items():
+            self._can_finish[done] = self._can_finish.get(done, False) or orders > 0
         self._goals: dict[tuple[tuple[int, ...], tuple[int, ...]], dict[str, Delivery]] = {}
         self._deliveries = {
             (number, goal): self._delivery(number, goal)
@@ -74,13 +74,13 @@ class TaskProgress:
         self.restart()
 
     def restart(self) -> None:
-        """Nothing is done."""
+        """Begin again: no subtask is done."""
         self.done, self.place = self._space.initial
         self.begun = self.done
 
     @property
     def is_over(self) -> bool:
-        """Whether everything is done."""
+        """Whether all subtasks are done."""
         return sum(self.done) == self._space.length
 
     @property
@@ -90,12 +90,12 @@ class TaskProgress:
 
     @property
     def goals(self) -> dict[str, Delivery]:
-        """What may be reached for now, sorted by name, and what would become of it; not to be changed."""
+        """Goals that may be reached for now, sorted by name, each with where it belongs; not to be changed."""
         return self._goals_at(self.done, self.begun)
 
     @property
     def first_goals(self) -> tuple[str, ...]:
-        """What may be reached for at the beginning."""
+        """Goals that may be reached for at the beginning."""
         nothing = self._space.initial[0]
         return tuple(self._goals_at(nothing, nothing))
 
@@ -104,7 +104,7 @@ class TaskProgress:
         if key not in self._goals:
             found: dict[str, Delivery] = {}
             for number in sorted({*self._space.ready(done)} & {*self._space.ready(begun)}):
-                if self._ways.get(_one_more(begun, number), False):
+                if self._can_finish.get(_one_more(begun, number), False):
                     for goal in self._space.classes[number].goals:
                         found.setdefault(goal, self._deliveries[number, goal])
             self._goals[key] = dict(sorted(found.items()))
@@ -119,15 +119,15 @@ class TaskProgress:
         return any(name == goal and d.kind != "touch" for (_, name), d in self._deliveries.items())
 
     def begin(self, delivery: Delivery) -> None:
-        """Somebody took the goal."""
+        """The goal was taken."""
         self.begun = _one_more(self.begun, delivery.number)
 
     def finish(self, delivery: Delivery) -> None:
-        """What was begun is done."""
+        """A subtask that was begun is done."""
         self.done = _one_more(self.done, delivery.number)
 
     def give_up(self, delivery: Delivery) -> None:
-        """What was begun is not done after all."""
+        """A subtask that was begun is not done after all."""
         self.begun = _one_more(self.begun, delivery.number, -1)
 
     def go_on(self, delivery: Delivery) -> None:

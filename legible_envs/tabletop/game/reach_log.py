@@ -1,4 +1,4 @@
-"""The reaches of an episode as they happen: where the hand was, when, and what it took in the end."""
+"""The reaches of an episode as they happen: the points and times of the hand, and the goal it took."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Reach:
         times: ``(k,)`` seconds since the episode began.
         start: Name of where it began.
         goal: The object reached.
-        candidates: What could validly be reached for when it was.
+        candidates: The goals that were valid when it ended.
         positions: ``(len(candidates), 2)`` where these were then.
     """
 
@@ -39,7 +39,7 @@ class Reach:
 
 
 class ReachLog:
-    """Where the hand is in the present reach, and the reaches before it.
+    """The present reach, and the reaches before it.
 
     Attributes:
         finished: The reaches of this episode that ended at a goal.
@@ -51,26 +51,26 @@ class ReachLog:
         self.clear()
 
     def clear(self) -> None:
-        """Forget everything."""
+        """Begin an episode."""
         self.finished: list[Reach] = []
         self.number = 0
         self.start = (0.0, 0.0)
         self._renew()
 
     def _renew(self) -> None:
-        # New arrays, so that whoever looks at the old ones keeps what they saw.
+        # New arrays, so that views of the old ones stay as they are.
         self._count = 0
         self._points = np.empty((_ROOM, 2))
         self._times = np.empty(_ROOM)
 
     @property
     def points(self) -> Floats:
-        """``(k, 2)`` where the hand was since the reach began; not a copy, to be read only."""
+        """``(k, 2)`` where the hand was since the reach began; not a copy, read it only."""
         return self._points[: self._count]
 
     @property
     def times(self) -> Floats:
-        """``(k,)`` when; not a copy, to be read only."""
+        """``(k,)`` seconds of these points; not a copy, read it only."""
         return self._times[: self._count]
 
     def begin(self, hand: Floats, time: float) -> None:

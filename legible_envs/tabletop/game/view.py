@@ -1,4 +1,4 @@
-"""A snapshot of a table in use, for drawing and for people: who is where, holds what, and what the robot believes."""
+"""A snapshot of a table in use, for drawing: objects, hand, robot, and what the robot believes."""
 
 from __future__ import annotations
 
@@ -24,28 +24,28 @@ def _no_points() -> npt.NDArray[np.float64]:
 
 @dataclass(frozen=True, eq=False)
 class TableView:
-    """Everything a drawing of a table in use shows. Points are ``(x, y)`` in metres, angles in radians.
+    """All that a drawing of a table in use shows. Points are ``(x, y)`` in metres, angles in radians.
 
     Attributes:
         layout: The layout that the episode began with: its obstacles, colours, shapes and sizes.
-        task: What is built.
+        task: The task.
         positions: ``(n, 2)`` centres of the objects now, in the order of ``layout.objects``.
         angles: ``(n,)`` their angles now.
         status: For each object ``"free"`` (lies on the table), ``"hand"`` or ``"robot"`` (is carried), or ``"placed"``
             (lies in its slot for good).
         hand: ``(2,)`` centre of the person's hand.
-        holding: What the hand carries.
+        holding: Object in the hand.
         robot: ``(2,)`` centre of the robot's gripper, or None where there is no robot.
-        robot_holding: What the gripper carries.
-        robot_target: What the robot is going for.
-        belief: Probability of each goal as the robot sees it, or None where nobody asks.
+        robot_holding: Object in the gripper.
+        robot_target: Object that the robot is going for.
+        belief: Probability of each goal as the robot sees it, or None where there is neither robot nor predictor.
         threshold: Above which the robot takes a goal for certain.
         goals: Objects that the person may validly take now.
-        goal: What the person is going for, where it is known.
+        goal: The person's goal, where it is known.
         trail: ``(k, 2)`` where the hand has been in the current reach, oldest first.
         time: Seconds since the episode began.
         crossings: How often the hand has crossed a virtual obstacle.
-        obstacles_mode: ``"hard"`` (the hand is stopped) or ``"soft"`` (crossings are counted).
+        virtual_obstacles: ``"hard"`` (the hand is stopped) or ``"soft"`` (crossings are counted).
     """
 
     layout: TabletopLayout
@@ -65,16 +65,16 @@ class TableView:
     trail: npt.NDArray[np.float64] = field(default_factory=_no_points)
     time: float = 0.0
     crossings: int = 0
-    obstacles_mode: Literal["hard", "soft"] = "hard"
+    virtual_obstacles: Literal["hard", "soft"] = "hard"
 
     @classmethod
     def at_rest(cls, layout: TabletopLayout, task: TabletopTask) -> TableView:
-        """The table before anyone has moved: the hand at the task's first start, everything where the layout has it."""
+        """The table before the first move: the hand at the task's first start, objects where the layout has them."""
         return cls(
             layout=layout,
             task=task,
             positions=layout.centres.copy(),
-            angles=np.array([thing.angle for thing in layout.objects]),
+            angles=np.array([obj.angle for obj in layout.objects]),
             status=("free",) * len(layout.objects),
             hand=np.array(layout.place(task.graph.start)),
         )

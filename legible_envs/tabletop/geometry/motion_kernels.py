@@ -66,11 +66,11 @@ def slide(
 ) -> tuple[float, float, bool]:
     """Where a free point ends that is moved by ``(dx, dy)``: it slides along ``boxes [m, 6]`` and the table's edge.
 
-    What is left of the move at a contact goes on along the side touched, so the point never goes further than it was
+    The rest of the move at a contact goes on along the side touched, so the point never goes further than it was
     told to, and it always ends where it is free.
 
     Returns:
-        ``x``, ``y``, and whether anything stopped it.
+        ``x``, ``y``, and whether an obstacle or the edge stopped it.
     """
     was_stopped = False
     for _ in range(TURNS):

@@ -68,7 +68,7 @@ def batch_paths(
     """Shortest paths from ``start [2]`` to each of ``goals [n, 2]``.
 
     Returns:
-        ``paths [n, corners + 2, 2]`` and how many points each has; 0 where there is no way.
+        ``paths [n, corners + 2, 2]`` and how many points each has; 0 where there is no path.
     """
     paths = np.empty((len(goals), len(corners) + 2, 2))
     counts = np.zeros(len(goals), dtype=np.int64)

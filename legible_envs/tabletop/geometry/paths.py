@@ -22,8 +22,8 @@ Floats = npt.NDArray[np.float64]
 class ShortestPaths:
     """Exact shortest paths of a point among grown obstacles, by a visibility graph built once.
 
-    See :class:`~legible_envs.tabletop.layout.TabletopLayout` for what is free. Where several paths are equally short,
-    one of them is returned, always the same.
+    :class:`~legible_envs.tabletop.layout.TabletopLayout` says where the hand may be. Where several paths are equally
+    short, one of them is returned, always the same.
 
     Args:
         goals: ``(n, 2)`` points.
@@ -83,14 +83,14 @@ class ShortestPaths:
         return batch_nearest_free(self.boxes, self.size, _points(points, "points"))
 
     def lengths(self, points: npt.ArrayLike) -> Floats:
-        """``(k, n)`` metres from each of ``(k, 2)`` points to every goal; inf where there is no way.
+        """``(k, n)`` metres from each of ``(k, 2)`` points to every goal; inf where there is no path.
 
-        There is no way from a point that is not free, nor to a goal that is not.
+        There is no path from a point that is not free, nor to a goal that is not.
         """
         return batch_lengths(self.boxes, self.size, self.corners, self.goals, self._lengths, _points(points, "points"))
 
     def polylines(self, start: npt.ArrayLike) -> list[Floats | None]:
-        """The ``(j, 2)`` points of a shortest path from a point to every goal, both ends included; None for no way."""
+        """The ``(j, 2)`` points of a shortest path from a point to every goal, both ends included; None for no path."""
         paths, counts = batch_paths(
             self.boxes,
             self.size,
@@ -106,7 +106,7 @@ class ShortestPaths:
         """The ``(j, 2)`` points of a shortest path from a point to one goal, by name or number.
 
         Raises:
-            LayoutError: There is no way, or no such goal.
+            LayoutError: There is no path, or no such goal.
         """
         if isinstance(goal, str):
             if goal not in self.names:
@@ -114,7 +114,7 @@ class ShortestPaths:
             goal = self.names.index(goal)
         path = self.polylines(start)[goal]
         if path is None:
-            raise LayoutError(f"no way from {start!r} to {self.names[goal]}", rule="reachable")
+            raise LayoutError(f"no path from {start!r} to {self.names[goal]}", rule="reachable")
         return path
 
 

@@ -4,8 +4,8 @@ A box is a row ``(x, y, cos, sin, half_length, half_width)``: an obstacle alread
 it lies on the table and outside the interior of every box; the boundary of a box is free. To make that exact in
 floating point, a box *blocks* as if it were smaller by ``SHRINK`` = 1e-9 m on each side, while paths bend at its true
 corners. A shortest path bends only at corners of boxes: where two boxes cross, and where a box meets the edge of the
-table, the free region is reflex the other way, so these points are never needed. Corners inside another box or off the
-table are dropped.
+table, the free region is reflex on the other side, so these points are never needed. Corners inside another box or off
+the table are dropped.
 
 Unused entries of the corner tables are never read: each kernel is told ``count``, the number of kept corners.
 """
@@ -85,7 +85,7 @@ def is_free(boxes: Floats, x: float, y: float, size: tuple[float, float]) -> boo
 
 @kernel
 def clear(boxes: Floats, x0: float, y0: float, x1: float, y1: float) -> bool:
-    """Whether the straight way between two points touches the interior of no box (separating axes, no division)."""
+    """Whether the straight line between two points touches the interior of no box (separating axes, no division)."""
     mx, my = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
     dx, dy = 0.5 * (x1 - x0), 0.5 * (y1 - y0)
     for i in range(len(boxes)):
@@ -111,7 +111,7 @@ def into_box(box: Floats, x: Floats, y: Floats, u: Floats, v: Floats) -> None:
 
 @kernel
 def block(box: Floats, u: Floats, v: Floats, x: float, y: float, slack: Floats) -> None:
-    """Raise ``slack`` of points (in the frame of a box) to at least 0 if the box is in the straight way to ``(x, y)``.
+    """Raise ``slack`` of points (in the frame of a box) to at least 0 if the box blocks the line to ``(x, y)``.
 
     The three separating axes of ``clear``; without branches, so that it is vectorised.
     """
@@ -150,7 +150,7 @@ def keep_corners(boxes: Floats, size: tuple[float, float], corners: Floats) -> i
 
 @kernel
 def corners_between(boxes: Floats, corners: Floats, count: int, between: Floats) -> None:
-    """Write straight distances of kept corners to ``between [4m, 4m]``; inf where a box is in the way."""
+    """Write straight distances of kept corners to ``between [4m, 4m]``; inf where a box blocks the line."""
     for i in range(count):
         between[i, i] = 0.0
         for j in range(i):
@@ -197,7 +197,7 @@ def path_tables(boxes: Floats, corners: Floats, count: int, between: Floats, goa
 
 @kernel
 def go_round(seen: Ints, hidden: Ints, between: Floats, lengths: Floats) -> None:
-    """Lengths of ways from corners that do not see the goal, by those that do and by one another.
+    """Lengths of paths from corners that do not see the goal, by those that do and by one another.
 
     Few corners lie on a path: to repeat until nothing changes (Bellman and Ford) beats a queue.
     """
@@ -234,7 +234,7 @@ def first_corner(
         goal_y: Of the goal.
 
     Returns:
-        ``(length, corner)``; corner -1 where the way is straight, and length inf where there is none.
+        ``(length, corner)``; corner -1 where the path is straight, and length inf where there is none.
     """
     if clear(boxes, x, y, goal_x, goal_y):
         return norm(goal_x - x, goal_y - y), -1
@@ -260,8 +260,8 @@ def write_path(
 ) -> int:
     """Write the points of a shortest path to ``path [4m + 2, 2]``; returns how many.
 
-    Of equally short ways the one that goes straight on, then over the corner nearest to the goal, then over that of the
-    lowest number.
+    Of equally short paths the one that goes straight on, then over the corner nearest to the goal, then over that of
+    the lowest number.
 
     Args:
         boxes: ``[m, 6]``.
@@ -269,7 +269,7 @@ def write_path(
         count: Kept corners.
         between: ``[4m, 4m]`` from :func:`corners_between`.
         lengths: ``[4m]`` from each corner to the goal.
-        first: The first corner, -1 for a straight way.
+        first: The first corner, -1 for a straight path.
         start: ``[2]``.
         goal: ``[2]``.
         path: Out.
@@ -288,13 +288,13 @@ def write_path(
 
 @kernel
 def next_corner(i: int, between: Floats, count: int, lengths: Floats) -> int:
-    """The corner after ``i`` on a way of several; -1 if there is none. All corners nearer to the goal are compared."""
+    """The corner after ``i`` on a path of several; -1 if there is none. All corners nearer to the goal are compared."""
     best, found = np.inf, -1
     for j in range(count):
         if lengths[j] < lengths[i]:
-            way = lengths[j] + between[j, i]
-            if way < best or (way == best < np.inf and lengths[j] < lengths[found]):
-                best, found = way, j
+            length = lengths[j] + between[j, i]
+            if length < best or (length == best < np.inf and lengths[j] < lengths[found]):
+                best, found = length, j
     return found
 
 

@@ -1,4 +1,4 @@
-"""Kernels of simulated reaches: the way of a hand with bow and rounded corners, and samples along it.
+"""Kernels of simulated reaches: the path of a hand with bow and rounded corners, and samples along it.
 
 Grown obstacles are rows as in :mod:`.visibility_kernels`. A hand that ignores obstacles is given none.
 """
@@ -65,7 +65,7 @@ def bow_leg(corners: Floats, leg: int, bow: float, aim: float, path: Floats) -> 
         corners: ``[j, 2]``.
         leg: Which one, from ``corners[leg]`` to ``corners[leg + 1]``.
         bow: Greatest deviation to the left, as a share of the leg's length.
-        aim: The same of what bends the other way in the second half.
+        aim: The same of the part that bends to the other side in the second half.
         path: ``[(j - 1) * LEG + 1, 2]``.
     """
     x, y = corners[leg, 0], corners[leg, 1]
@@ -141,7 +141,7 @@ def round_corner(boxes: Floats, hand: float, corners: Floats, corner: int, radiu
 def trace_path(
     boxes: Floats, hand: float, bounds: Bounds, corners: Floats, bow: float, aim: float, radius: float, path: Floats
 ) -> None:
-    """The way a hand means to go along a shortest path: each leg bowed where there is room, corners rounded.
+    """The intended path of a hand along a shortest one: each leg bowed where there is room, corners rounded.
 
     Args:
         boxes: ``[m, 6]`` grown obstacles.

@@ -1,4 +1,4 @@
-"""People who reach: one person's ways and habits, and how these differ in a population.
+"""How people reach: the parameters of one person, and how these differ in a population.
 
 A reach follows the shortest path of the hand (Tung et al., HRI 2024, assume as much) with what is known of hands:
 
@@ -7,7 +7,7 @@ A reach follows the shortest path of the hand (Tung et al., HRI 2024, assume as 
   they aim (Marteniuk et al., 1987);
 * its legs are bowed sideways, by an amount that differs between people and directions (Atkeson and Hollerbach, 1985;
   Wolpert et al., 1995), as far as there is room between obstacles;
-* its direction is off at first and corrected on the way (Georgopoulos and Massey, 1988);
+* its direction is off at first and corrected during the reach (Georgopoulos and Massey, 1988);
 * its duration follows Fitts' law (Fitts, 1954, in the form of MacKenzie, 1992), with a price for every corner passed,
   whose roundness depends on the person;
 * where it begins and ends is noisy (Harris and Wolpert, 1998).
@@ -38,11 +38,11 @@ class Person:
         skew: Median exponent of time; 1 is minimum jerk, more is an earlier peak of speed.
         skew_trial: Standard deviation of its logarithm from reach to reach.
         bow: Mean lateral deviation in the middle of a leg, to the left, as a share of the leg's length.
-        bow_turns: What direction ``d`` (from start to goal, counter-clockwise from the x-axis) adds to it:
+        bow_turns: Addition to it in direction ``d`` (from start to goal, counter-clockwise from the x-axis):
             ``a cos d + b sin d + c cos 2d + e sin 2d``.
         bow_trial: Standard deviation from reach to reach.
-        aim: Standard deviation of the deviation, as a share of the leg's length, that goes one way in the first half
-            of a leg and is corrected to the other in the second.
+        aim: Standard deviation of the deviation, as a share of the leg's length, that goes to one side in the first
+            half of a leg and is corrected to the other in the second.
         intercept: Of Fitts' law, in seconds. With these defaults a reach of 54 cm to a cube takes 0.75 s, the pace of
             unhurried prehension (Jeannerod, 1984).
         slope: Of Fitts' law, in seconds per bit.
@@ -50,12 +50,12 @@ class Person:
         duration_trial: Standard deviation of the logarithm of durations from reach to reach.
         corner_radius: Metres before and after a corner within which it is rounded, where there is room.
         endpoint_sd: Standard deviation of where a reach ends about its goal, on each axis, in metres.
-        start_sd: The same of where it begins; this deviation wanders, and fades on the way.
+        start_sd: The same of where it begins; this deviation wanders, and fades towards the goal.
         drift_time: In how many seconds it wanders (time constant of its autocorrelation).
         signal_sd: Standard deviation of white noise on every sample, on each axis, in metres.
         pause: Seconds to grasp or to let go.
-        crossing_rate: Probability of a reach to ignore virtual obstacles as if there were none. Nobody has measured it
-            yet: vary it.
+        crossing_rate: Probability that a reach ignores virtual obstacles as if there were none. It has not been
+            measured yet: vary it.
 
     Raises:
         ValueError: A value is out of range.
@@ -100,22 +100,22 @@ class Person:
         """Median duration of a reach in seconds.
 
         Args:
-            length: Of the way, in metres.
-            width: Of what is reached for, in metres.
-            corners: How many are passed.
+            length: Of the path, in metres.
+            width: Of the object, in metres.
+            corners: Number of corners passed.
         """
         return self.intercept + self.slope * math.log2(length / width + 1.0) + self.corner_cost * corners
 
 
 @dataclass(frozen=True)
 class ReachModel:
-    """A population of people who reach; see the module for where the model and its numbers come from.
+    """A population of people who reach; the module's docstring names the sources of the model and its numbers.
 
     Over people and directions, bows have the variance ``bow_spread ** 2 + 2 bow_target ** 2 + bow_trial ** 2``, .035
     squared with the defaults.
 
     Attributes:
-        median: The person in the middle. What has no spread here is the same for everybody.
+        median: The person in the middle. Parameters without a spread here are the same for all people.
         skew_spread: Standard deviation of the logarithm of ``skew`` between people.
         bow_spread: Standard deviation of ``bow`` between people.
         bow_target: Standard deviation of each of their four ``bow_turns``.

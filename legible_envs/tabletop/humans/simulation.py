@@ -1,12 +1,12 @@
-"""Simulated people at tables: single reaches, and whole task executions.
+"""Simulated participants at tables: single reaches, and whole task executions.
 
-A person follows the shortest path of the hand the way people reach, see :mod:`legible_envs.tabletop.humans.model`; one
-who ignores virtual obstacles reaches as if they were absent.
+A person follows the shortest path of the hand as :mod:`legible_envs.tabletop.humans.model` describes; a person who
+ignores virtual obstacles reaches as if they were absent.
 
 >>> import numpy as np
 >>> from legible_envs.tabletop import TabletopTask
 >>> task = TabletopTask.named("columns")
->>> reaches = simulate_participants(task, task.layout, 2, np.random.default_rng(0))
+>>> reaches = simulate_participants(task.layout, 2, np.random.default_rng(0))
 >>> len(reaches), reaches[0].start, len(reaches[0].candidates), len(reaches[4].candidates)
 (16, 'home', 4, 4)
 """
@@ -32,6 +32,8 @@ from legible_envs.tabletop.task import TabletopTask
 __all__ = [
     "Person",
     "ReachModel",
+    "ReachPlan",
+    "SimulatedReach",
     "plan_reach",
     "sample_person",
     "simulate_participants",
@@ -45,12 +47,20 @@ _NO_BOXES: Final = np.empty((0, 6))
 _FARTHEST_BOW: Final = 0.5
 
 
+class _Route(NamedTuple):
+    """The inputs of a shortest path."""
+
+    start: Point
+    goal: str | Point
+    crossing: bool
+
+
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """What a hand moves over: obstacles, the table's edges, and the ways found so far."""
+    """The surface that a hand moves over: obstacles, the table's edges, and the shortest paths found so far."""
 
     layout: TabletopLayout | None
-    ways: dict[tuple[object, ...], Floats] = field(default_factory=dict)
+    paths: dict[_Route, Floats] = field(default_factory=dict)
 
     @property
     def hand(self) -> float:
@@ -73,19 +83,19 @@ class Surface:
         return self.layout.place(name)
 
     def width(self, goal: object) -> float:
-        """How wide what is reached for is: the shorter side of an object, a cube's otherwise."""
+        """Width of the goal: the shorter side of an object, a cube's otherwise."""
         if self.layout is not None and isinstance(goal, str) and goal in self.layout.goals:
             return min(self.layout.objects[self.layout.index(goal)].size)
         return CUBE
 
-    def way(self, start: Point, goal: str | Point, crossing: bool) -> Floats:
-        """``(j, 2)`` the shortest path, straight for those who cross obstacles."""
-        key = (start, goal, crossing)
-        if key not in self.ways:
-            self.ways[key] = self._find_way(start, goal, crossing)
-        return self.ways[key]
+    def shortest_path(self, start: Point, goal: str | Point, crossing: bool) -> Floats:
+        """``(j, 2)`` the shortest path, straight for people who cross obstacles."""
+        route = _Route(start, goal, crossing)
+        if route not in self.paths:
+            self.paths[route] = self._find_path(start, goal, crossing)
+        return self.paths[route]
 
-    def _find_way(self, start: Point, goal: str | Point, crossing: bool) -> Floats:
+    def _find_path(self, start: Point, goal: str | Point, crossing: bool) -> Floats:
         if crossing or self.layout is None or not self.layout.obstacles:
             return np.array([start, self.place(goal, "the goal")])
         paths = self.layout.paths
@@ -97,9 +107,33 @@ class Surface:
         return ShortestPaths(target, rows, self.hand, self.layout.table.size).polyline(first, 0)
 
 
-def sample_person(rng: np.random.Generator, model: ReachModel | None = None) -> Person:
+def sample_person(rng: np.random.Generator, population: ReachModel | None = None) -> Person:
     """A random person of a population, the default one if None."""
-    return (model or ReachModel()).sample_person(rng)
+    return (population or ReachModel()).sample_person(rng)
+
+
+class ReachPlan(NamedTuple):
+    """The plan of one reach.
+
+    Attributes:
+        path: ``(k, 2)`` points of a smooth path.
+        duration: Seconds.
+    """
+
+    path: Floats
+    duration: float
+
+
+class SimulatedReach(NamedTuple):
+    """One reach.
+
+    Attributes:
+        times: ``(T,)`` seconds from 0; ``T >= 3``.
+        states: ``(T, 2)`` positions of the hand in metres.
+    """
+
+    times: Floats
+    states: Floats
 
 
 def plan_reach(
@@ -108,26 +142,23 @@ def plan_reach(
     goal: str | npt.ArrayLike,
     person: Person,
     rng: np.random.Generator,
-) -> tuple[Floats, float]:
-    """What a person means to do: the way of one reach, and how long it shall take.
+) -> ReachPlan:
+    """Plan one reach: its path, and how long it shall take.
 
     Args:
         layout: The table; None for open space, where start and goal are points.
         start: Name of a start or object, or a point ``(x, y)``. One inside a grown obstacle is left from the nearest
             free point.
-        goal: The same. Where it ends is off by ``person.endpoint_sd``, as far as there is room.
-        person: Who reaches.
+        goal: The same. The reach ends off it by ``person.endpoint_sd``, as far as there is room.
+        person: How the person reaches.
         rng: Source of randomness.
 
-    Returns:
-        ``(k, 2)`` points of a smooth way, and seconds.
-
     Raises:
-        LayoutError: Unknown places, or no way.
+        LayoutError: Unknown places, or no path.
     """
     surface = Surface(layout)
     intent = _intend(surface, start, goal, person, rng)
-    return _trace(surface, intent, person, rng), intent.duration
+    return ReachPlan(_trace(surface, intent, person, rng), intent.duration)
 
 
 def simulate_reach(
@@ -136,26 +167,25 @@ def simulate_reach(
     goal: str | npt.ArrayLike,
     person: Person,
     rng: np.random.Generator,
+    *,
     rate: float = 30.0,
-) -> tuple[Floats, Floats]:
-    """One reach.
+) -> SimulatedReach:
+    """Simulate one reach.
 
-    Nothing of the goal shows in the first sample: where it lies depends on the start alone.
+    The first sample does not give the goal away: it depends on the start alone.
 
     Args:
-        layout: See :func:`plan_reach`.
-        start: See :func:`plan_reach`.
-        goal: See :func:`plan_reach`.
-        person: Who reaches. Unless they cross obstacles, they never lead their hand's centre through one as it is
-            drawn; into the margin by which it is grown, noise and rounded corners sometimes do.
+        layout: The table; None for open space, where start and goal are points.
+        start: Name of a start or object, or a point ``(x, y)``. A reach from inside a grown obstacle begins at the
+            nearest free point.
+        goal: The same. The reach ends off it by ``person.endpoint_sd``, as far as there is room.
+        person: How the person reaches. Unless they cross obstacles, the centre of their hand never passes through one
+            as it is drawn; noise and rounded corners may lead it into the margin by which obstacles are grown.
         rng: Source of randomness.
         rate: Samples per second.
 
-    Returns:
-        ``(T,)`` seconds from 0, and ``(T, 2)`` positions in metres; ``T >= 3``.
-
     Raises:
-        LayoutError: Unknown places, or no way.
+        LayoutError: Unknown places, or no path.
         ValueError: A rate out of range.
 
     Example:
@@ -168,82 +198,90 @@ def simulate_reach(
 
 
 def simulate_task(
-    task: TabletopTask,
     layout: TabletopLayout,
     person: Person,
     rng: np.random.Generator,
     *,
-    rate: float = 30.0,
+    task: TabletopTask | None = None,
     participant: str = "person",
     condition: str = "simulated",
     layout_name: str = "",
+    rate: float = 30.0,
 ) -> list[Trajectory]:
     """The reaches of a person who does a whole task once, in a uniformly random valid sequence.
 
     Each stage of the task (start, valid goals) gives a trajectory, with the valid goals as candidates (candidate set
-    ``task``). Grasping, carrying and letting go take their time and give none.
+    ``task``). Grasping, carrying and letting go take their time and give no trajectory.
 
     Args:
-        task: What to do.
         layout: The table, with the objects of the task.
-        person: Who does it.
+        person: How the person reaches.
         rng: Source of all randomness.
-        rate: Samples per second.
+        task: The task; the one of the package that has the layout's objects if None.
         participant: Of all trajectories.
         condition: Of all trajectories.
         layout_name: Of all trajectories.
+        rate: Samples per second.
 
     Raises:
-        LayoutError: The task cannot be done on this table.
+        LayoutError: The task cannot be done on this table, or no task of the package has its objects.
         ValueError: A rate out of range.
     """
     labels = {"participant": participant, "condition": condition, "layout_name": layout_name}
-    return _execute(task, Surface(layout), person, 0.0, rng, _checked_rate(rate), labels)[0]
+    task, rate = _checked_task(task, layout), _checked_rate(rate)
+    return _execute(task, Surface(layout), person, 0.0, rng, rate, labels).reaches
 
 
 def simulate_participants(
-    task: TabletopTask,
     layout: TabletopLayout,
     n: int,
     rng: np.random.Generator,
     *,
-    model: ReachModel | None = None,
+    task: TabletopTask | None = None,
+    population: ReachModel | None = None,
     executions: int = 1,
-    rate: float = 30.0,
     participant: str = "person",
     condition: str = "simulated",
     layout_name: str = "",
+    rate: float = 30.0,
 ) -> list[Trajectory]:
-    """The reaches of ``n`` people, drawn from a population, who each do a whole task.
+    """The reaches of ``n`` participants, drawn from a population, who each do a whole task.
 
     Args:
-        task: What to do.
         layout: The table, with the objects of the task.
-        n: Number of people.
+        n: Number of participants.
         rng: Source of all randomness.
-        model: The population; the default one if None.
-        executions: How often each person does the task.
-        rate: Samples per second.
+        task: The task; the one of the package that has the layout's objects if None.
+        population: The people to draw participants from; the default population if None.
+        executions: How often each participant does the task.
         participant: Names are ``"{participant}/0"``, ``"{participant}/1"``, ….
         condition: Of all trajectories.
         layout_name: Of all trajectories.
+        rate: Samples per second.
 
     Raises:
-        LayoutError: The task cannot be done on this table.
+        LayoutError: The task cannot be done on this table, or no task of the package has its objects.
         ValueError: A number out of range.
     """
     for name, value in (("n", n), ("executions", executions)):
         if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 0:
             raise ValueError(f"{name} must be an integer >= 0, got {value!r}")
-    rate, surface = _checked_rate(rate), Surface(layout)
+    task, rate, surface = _checked_task(task, layout), _checked_rate(rate), Surface(layout)
     found: list[Trajectory] = []
     for number in range(n):
-        person, clock = sample_person(rng, model), 0.0
+        person, clock = sample_person(rng, population), 0.0
         labels = {"participant": f"{participant}/{number}", "condition": condition, "layout_name": layout_name}
         for _ in range(executions):
             reaches, clock = _execute(task, surface, person, clock, rng, rate, labels)
             found += reaches
     return found
+
+
+class _Execution(NamedTuple):
+    """One task execution: its trajectories, and the time at its end."""
+
+    reaches: list[Trajectory]
+    end: float
 
 
 def _execute(
@@ -254,11 +292,10 @@ def _execute(
     rng: np.random.Generator,
     rate: float,
     labels: dict[str, Any],
-) -> tuple[list[Trajectory], float]:
-    """One task execution: its trajectories, and the time at its end."""
+) -> _Execution:
+    """One task execution that begins at a time."""
     layout = surface.layout
     assert layout is not None
-    _check_objects(task, layout)
     found = []
     for step in task.graph.sample(rng):
         times, states = _reach(surface, step.start, step.goal, person, rng, rate)
@@ -278,16 +315,16 @@ def _execute(
         clock += float(times[-1]) + person.pause
         for before, after in zip((step.goal, *step.then), step.then, strict=False):
             clock += _intend(surface, before, after, person, rng).duration + person.pause
-    return found, clock
+    return _Execution(found, clock)
 
 
 class _Intent(NamedTuple):
-    """What a person decides before setting out.
+    """The decisions of a person before they set out.
 
     Attributes:
-        start: Where from.
+        start: Point where the reach begins.
         corners: ``(j, 2)`` the shortest path to the goal.
-        boxes: ``(m, 6)`` grown obstacles that count for this reach; none for one who crosses.
+        boxes: ``(m, 6)`` grown obstacles that count for this reach; none for a person who crosses them.
         duration: Seconds.
     """
 
@@ -303,14 +340,14 @@ def _intend(
     crossing = rng.random() < person.crossing_rate
     first = surface.place(start, "the start")
     target = goal if isinstance(goal, str) else point(goal, "the goal")
-    corners = surface.way(first, target, crossing)
+    corners = surface.shortest_path(first, target, crossing)
     duration = person.duration(float(path_length(corners)), surface.width(goal), len(corners) - 2)
     boxes = _NO_BOXES if crossing or surface.layout is None else surface.layout.paths.boxes
     return _Intent(first, corners, boxes, duration * math.exp(person.duration_trial * rng.standard_normal()))
 
 
 def _trace(surface: Surface, intent: _Intent, person: Person, rng: np.random.Generator) -> Floats:
-    """``(k, 2)`` the way a hand takes along the shortest path."""
+    """``(k, 2)`` the path of the hand along the shortest one."""
     bow, aim, x, y = rng.standard_normal(4).tolist()
     corners = miss_goal(intent.boxes, surface.bounds, intent.corners, person.endpoint_sd * x, person.endpoint_sd * y)
     lean = person.bow_towards(intent.start, (corners[-1, 0], corners[-1, 1])) + person.bow_trial * bow
@@ -335,8 +372,8 @@ def _reach(
     person: Person,
     rng: np.random.Generator,
     rate: float,
-) -> tuple[Floats, Floats]:
-    """See :func:`simulate_reach`."""
+) -> SimulatedReach:
+    """One reach with checked arguments."""
     intent = _intend(surface, start, goal, person, rng)
     path = _trace(surface, intent, person, rng)
     skew = person.skew * math.exp(person.skew_trial * rng.standard_normal())
@@ -354,7 +391,7 @@ def _reach(
         rng.standard_normal((2, count, 2)),
         states,
     )
-    return np.arange(count) / rate, states
+    return SimulatedReach(np.arange(count) / rate, states)
 
 
 def _checked_rate(rate: float) -> float:
@@ -363,10 +400,13 @@ def _checked_rate(rate: float) -> float:
     return float(rate)
 
 
-def _check_objects(task: TabletopTask, layout: TabletopLayout) -> None:
+def _checked_task(task: TabletopTask | None, layout: TabletopLayout) -> TabletopTask:
+    if task is None:
+        return TabletopTask.for_layout(layout)
     known = {*layout.goals, *layout.table.starts}
     missing = [place for place in task.graph.places if place not in known]
     if missing:
         raise LayoutError(
             f"task {task.name!r} needs {missing}, which this layout lacks; it has {sorted(known)}", rule="object"
         )
+    return task

@@ -1,1 +1,1 @@
-"""A robot that shares the table: what it believes, how it moves, and how fluent the team is."""
+"""A robot that shares the table: its beliefs, its motion, and the fluency of the team."""

@@ -1,37 +1,49 @@
-"""What a reaching hand gives away: Eq. 1 along a reach, with shortest paths among obstacles as costs."""
+"""Bayesian goal inference along a reach, with shortest paths among obstacles as costs."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from legible_envs.errors import LayoutError
 from legible_envs.tabletop.geometry.paths import ShortestPaths
-from legible_envs.tabletop.partner.belief_kernels import reach_posterior, ways
+from legible_envs.tabletop.partner.belief_kernels import reach_lengths, reach_posterior
 
 if TYPE_CHECKING:
     from legible_envs.rollouts.trajectory import Trajectory
     from legible_envs.tabletop.layout import TabletopLayout
 
-__all__ = ["EqOne", "EqOneBelief"]
+__all__ = ["BayesianIntent", "GoalBelief"]
+
+Floats = npt.NDArray[np.float64]
 
 BETA = 20.0
 
 
-class EqOneBelief:
-    r"""The posterior over goals of one reach, updated as the hand moves.
+class _PathTables(NamedTuple):
+    """The first arguments of the kernels: shortest paths to the goals of one belief."""
+
+    boxes: Floats
+    size: tuple[float, float]
+    corners: Floats
+    goals: Floats
+    lengths: Floats
+
+
+class GoalBelief:
+    r"""The probability of each goal of one reach, updated as the hand moves (Bayesian goal inference).
 
     ``P(G | S->Q) ∝ P(G) exp(-beta (C(S->Q) + C*(Q->G) - C*(S->G)))``, Eq. 1 of Tung et al. (HRI 2024) after Dragan and
     Srinivasa (2013), with ``C*`` the length of the shortest path of the hand (see
     :class:`~legible_envs.tabletop.layout.TabletopLayout`). The cost so far, ``C(S->Q)``, is the same for every goal
     and cancels: only where the reach began and where the hand is now matter. At the start the belief is the prior.
 
-    A hand inside a grown obstacle counts as being at the nearest free point. A goal without a way, which a cube pushed
-    behind obstacles can become, is counted by its straight line. So every cost is finite.
+    A hand inside a grown obstacle counts as being at the nearest free point. A goal that no path leads to,
+    such as a cube pushed behind obstacles, counts by its straight line. So every cost is finite.
 
     Args:
         layout: The table.
@@ -49,9 +61,9 @@ class EqOneBelief:
     Example:
         >>> from legible_envs.tabletop import TableObject, TabletopLayout
         >>> layout = TabletopLayout([TableObject("cup", (0.4, 0.5)), TableObject("milk", (0.8, 0.5))])
-        >>> belief = EqOneBelief(layout, start="home")
+        >>> belief = GoalBelief(layout, start="home")
         >>> {goal: round(p, 3) for goal, p in belief.update((0.55, 0.15)).items()}
-        {'cup': 0.86, 'milk': 0.14}
+        {'cup': 0.728, 'milk': 0.272}
     """
 
     def __init__(
@@ -72,13 +84,13 @@ class EqOneBelief:
         self._beta = float(beta)
         self._prior = _checked_prior(prior, self.goals)
         paths, rows = _paths_to(layout, self.goals, positions)
-        self._tables = (paths.boxes, paths.size, paths.corners, paths.goals[rows], paths.tables[rows])
-        self._optimal: npt.NDArray[np.float64] | None = None
+        self._tables = _PathTables(paths.boxes, paths.size, paths.corners, paths.goals[rows], paths.tables[rows])
+        self._optimal: Floats | None = None
         self._row = self._prior.copy()
         if isinstance(start, str):
             start = layout.place(start)
         if start is not None:
-            self._optimal = self._ways(*_checked_point(start))
+            self._optimal = self._lengths(*_checked_point(start))
 
     @property
     def belief(self) -> dict[str, float]:
@@ -97,18 +109,20 @@ class EqOneBelief:
         """
         x, y = _checked_point(point)
         if self._optimal is None:
-            self._optimal = self._ways(x, y)
+            self._optimal = self._lengths(x, y)
         reach_posterior(*self._tables, self._optimal, self._prior, self._beta, x, y, self._row)
         return self.belief
 
-    def _ways(self, x: float, y: float) -> npt.NDArray[np.float64]:
+    def _lengths(self, x: float, y: float) -> Floats:
         lengths = np.empty(len(self.goals))
-        ways(*self._tables, x, y, lengths)
+        reach_lengths(*self._tables, x, y, lengths)
         return lengths
 
 
-class EqOne:
-    """:class:`EqOneBelief` in the form of a predictor: it opens a stream for each reach.
+class BayesianIntent:
+    """Bayesian goal inference in the form of a predictor: it opens a :class:`GoalBelief` for each reach.
+
+    On the table it is known by the name ``"bayesian"``. It has no parameters to learn.
 
     Args:
         beta: Rationality per metre.
@@ -118,17 +132,17 @@ class EqOne:
         self.beta = beta
 
     def __repr__(self) -> str:
-        return f"EqOne(beta={self.beta!r})"
+        return f"BayesianIntent(beta={self.beta!r})"
 
-    def stream(self, context: Trajectory) -> EqOneBelief:
-        """Watch one reach.
+    def stream(self, context: Trajectory) -> GoalBelief:
+        """Follow one reach.
 
         Args:
             context: A trajectory with a ``layout`` of the table, ``candidates``, and ``goal_positions`` where the
-                objects were moved. Its states are not looked at: the reach begins at the first point of ``update``.
+                objects were moved. Its states do not matter: the reach begins at the first point of ``update``.
         """
         layout: TabletopLayout = context.layout  # type: ignore[assignment]
-        return EqOneBelief(layout, self.beta, goals=context.candidates, positions=context.goal_positions)
+        return GoalBelief(layout, self.beta, goals=context.candidates, positions=context.goal_positions)
 
 
 def _paths_to(
@@ -157,7 +171,7 @@ def _checked_point(point: npt.ArrayLike) -> tuple[float, float]:
     return x, y
 
 
-def _checked_prior(prior: Mapping[str, float] | None, goals: tuple[str, ...]) -> npt.NDArray[np.float64]:
+def _checked_prior(prior: Mapping[str, float] | None, goals: tuple[str, ...]) -> Floats:
     if prior is None:
         return np.full(len(goals), 1.0 / len(goals))
     if set(prior) != set(goals):

@@ -1,4 +1,4 @@
-"""Kernels: Eq. 1 for one hand among grown obstacles, from the tables of :mod:`.visibility_kernels`."""
+"""Kernels: Bayesian goal inference (Eq. 1) for one hand among grown obstacles."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import numpy as np
 from legible_envs.support.compiled import kernel
 from legible_envs.tabletop.geometry.visibility_kernels import Floats, first_corner, nearest_free, norm
 
-__all__ = ["reach_posterior", "ways"]
+__all__ = ["reach_lengths", "reach_posterior"]
 
 
 @kernel
-def ways(
+def reach_lengths(
     boxes: Floats,
     size: tuple[float, float],
     corners: Floats,
@@ -21,10 +21,10 @@ def ways(
     y: float,
     lengths: Floats,
 ) -> None:
-    """Write to ``lengths [n]`` the way from a point to each goal: always finite.
+    """Write to ``lengths [n]`` the length of the shortest path from a point to each goal: always finite.
 
-    A point inside a grown obstacle counts as the free point nearest to it. Where there is no way the straight line
-    counts, as for someone who ignores the obstacles.
+    A point inside a grown obstacle counts as the free point nearest to it. Where there is no path the straight line
+    counts, as for a person who ignores the obstacles.
 
     Args:
         boxes: ``[m, 6]`` grown obstacles.
@@ -61,19 +61,19 @@ def reach_posterior(
     """Write to ``belief [n]`` the probability of each goal with the hand at a point.
 
     Args:
-        boxes: See :func:`ways`.
-        size: See :func:`ways`.
-        corners: See :func:`ways`.
-        goals: See :func:`ways`.
-        tables: See :func:`ways`.
-        optimal: ``[n]`` the way from the start to each goal.
+        boxes: ``[m, 6]`` grown obstacles.
+        size: Of the table.
+        corners: ``[k, 2]`` corners a path may bend at.
+        goals: ``[n, 2]``.
+        tables: ``[n, k]`` shortest path from each corner to each goal.
+        optimal: ``[n]`` shortest path from the start to each goal.
         prior: ``[n]``.
         beta: Rationality per metre.
         x: Of the hand.
         y: Of the hand.
         belief: Out.
     """
-    ways(boxes, size, corners, goals, tables, x, y, belief)
+    reach_lengths(boxes, size, corners, goals, tables, x, y, belief)
     # least over goals that are possible at all, so that not all weights can vanish
     least = np.inf
     for g in range(len(goals)):

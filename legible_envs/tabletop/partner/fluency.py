@@ -1,8 +1,8 @@
-"""How fluently a person and a robot work together, from a log of who did what when.
+"""How fluently a person and a robot work together, from a log of what both did and when.
 
 The four objective measures are those of G. Hoffman, *Evaluating Fluency in Human-Robot Collaboration*, IEEE
 Transactions on Human-Machine Systems 49(3), 2019: human idle time, robot idle time, concurrent activity and functional
-delay, each as a share of the time that the task took. To these comes what reading the person early is about: when the
+delay, each as a share of the time that the task took. Measures of early prediction are added: when the
 robot was sure, whether rightly, and how often both wanted the same object.
 """
 
@@ -15,27 +15,27 @@ from itertools import pairwise
 
 from legible_envs.tabletop.partner.interface import Command, Senses
 
-__all__ = ["Reading", "TeamMetrics", "Tick", "tick_of"]
+__all__ = ["ReachPrediction", "TeamMetrics", "Tick", "tick_of"]
 
 
 @dataclass(frozen=True, slots=True)
 class Tick:
-    """One line of a log: what held from ``time`` until the next line.
+    """One line of a log: the state from ``time`` until the next line.
 
-    An *action* is a stretch of lines in a row with the same label; None is no action. A person's action is a reach with
-    what follows until the object is placed, a robot's is to fetch one object.
+    An *action* is a stretch of lines in a row with the same label; None is no action. A person's action is a reach and
+    the carrying until the object is placed, a robot's is to fetch one object.
 
     Attributes:
         time: Seconds, not before that of the line before.
-        human: Label of what the person does; None while idle.
-        robot: Label of what the robot does; None while idle (waiting, or on its way home).
+        human: Label of the person's action; None while idle.
+        robot: Label of the robot's action; None while idle (waiting, or returning home).
         reach: How many reaches the person has begun; 0 before the first.
-        taken: What the person holds.
-        predicted: What the robot is sure the person reaches for; None while it is not.
+        taken: Object in the person's hand.
+        predicted: Goal that the robot is sure of; None while it is not sure.
         choices: How many objects the person may validly reach for; 0 while they must wait. Does not count while they
             hold something. A real choice unless told otherwise.
         conflict: Whether the robot gave up its target in this line because the person took it.
-        lost: Whether the robot took in this line what the person was going for, where that is known.
+        lost: Whether the robot took the person's goal in this line, where that goal is known.
     """
 
     time: float
@@ -53,10 +53,10 @@ def tick_of(senses: Senses, command: Command, human_active: bool, lost: bool = F
     """The line of a log for one step of a robot.
 
     Args:
-        senses: What the robot sensed.
-        command: What it did.
+        senses: The robot's senses.
+        command: Its command.
         human_active: Whether the person is doing something: moving their hand, taking or placing an object.
-        lost: Whether the robot took what the person was going for.
+        lost: Whether the robot took the person's goal.
     """
     return Tick(
         time=senses.time,
@@ -72,17 +72,17 @@ def tick_of(senses: Senses, command: Command, human_active: bool, lost: bool = F
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
-    """How a robot read one reach that ended in taking an object.
+class ReachPrediction:
+    """How a robot predicted the goal of one reach that ended in taking an object.
 
     Attributes:
         reach: Number of the reach.
-        taken: What the person took.
-        duration: Seconds from the reach's first line with anything to reach for to that in which it was taken.
+        taken: Object that the person took.
+        duration: Seconds from the reach's first line with a valid goal to that in which the object was taken.
         decision_time: Seconds from its first line to that in which the robot was sure for the first time; all of
             ``duration`` where it never was.
-        predicted: What it was sure of then; None where it never was.
-        choices: The most objects that could validly be reached for in one line; with 1 there is nothing to read.
+        predicted: Goal it was sure of then; None where it never was.
+        choices: The most objects that could validly be reached for in one line; with 1 there is nothing to predict.
     """
 
     reach: int
@@ -115,14 +115,14 @@ class TeamMetrics:
     """Team measures of one episode, kept up to date line by line.
 
     Attributes:
-        readings: Every reach that ended in taking an object.
-        conflicts: How often both wanted the same object: the person took the robot's target, or the robot took what
-            the person was known to go for.
+        predictions: One for every reach that ended in taking an object.
+        conflicts: How often both wanted the same object: the person took the robot's target, or the robot took
+            the person's known goal.
         goals_lost: How often it was the latter, the price of acting on a wrong guess.
     """
 
     def __init__(self) -> None:
-        self.readings: list[Reading] = []
+        self.predictions: list[ReachPrediction] = []
         self.conflicts = 0
         self.goals_lost = 0
         self._first: Tick | None = None
@@ -180,13 +180,13 @@ class TeamMetrics:
         """
         start = self._first.time if self._first else 0.0
         time = self._last.time - start if self._last else 0.0
-        readings = [reading for reading in self.readings if reading.choices > 1]
+        predictions = [prediction for prediction in self.predictions if prediction.choices > 1]
 
         def share(value: float) -> float:
             return value / time if time > 0 else math.nan
 
         def mean(values: Iterable[float]) -> float:
-            return math.fsum(values) / len(readings) if readings else math.nan
+            return math.fsum(values) / len(predictions) if predictions else math.nan
 
         return {
             "time": time,
@@ -197,11 +197,11 @@ class TeamMetrics:
             "functional_delay": share(self._functional_delay()),
             "conflicts": float(self.conflicts),
             "goals_lost": float(self.goals_lost),
-            "reaches": float(len(self.readings)),
-            "decision_time": mean(r.decision_time for r in readings),
-            "decision_fraction": mean(r.fraction for r in readings),
-            "decided": mean(r.predicted is not None for r in readings),
-            "decided_rightly": mean(r.correct for r in readings),
+            "reaches": float(len(self.predictions)),
+            "decision_time": mean(p.decision_time for p in predictions),
+            "decision_fraction": mean(p.fraction for p in predictions),
+            "decided": mean(p.predicted is not None for p in predictions),
+            "decided_rightly": mean(p.correct for p in predictions),
         }
 
     def _count_time(self, last: Tick, now: float) -> None:
@@ -247,5 +247,5 @@ class TeamMetrics:
         duration = tick.time - self._reach.time
         sure = self._sure
         decision, goal = (duration, None) if sure is None else (sure.time - self._reach.time, sure.predicted)
-        self.readings.append(Reading(tick.reach, tick.taken, duration, decision, goal, self._choices))
+        self.predictions.append(ReachPrediction(tick.reach, tick.taken, duration, decision, goal, self._choices))
         self._reach_ended = True

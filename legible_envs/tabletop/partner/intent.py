@@ -1,4 +1,4 @@
-"""Watching a person's reaches through any predictor, so that a predictor that fails stops nobody."""
+"""Observing a person's intent through any predictor; a predictor that fails does not stop the episode."""
 
 from __future__ import annotations
 
@@ -7,89 +7,105 @@ import math
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
 from legible_envs.rollouts.trajectory import Trajectory
 from legible_envs.support.plugins import Registry
-from legible_envs.tabletop.partner.belief import EqOne
+from legible_envs.tabletop.partner.belief import BayesianIntent
+from legible_envs.tabletop.partner.interface import Floats, GoalStream, PrefixPredictor, Senses, StreamingPredictor
 
 if TYPE_CHECKING:
     from legible_envs.tabletop.layout import TabletopLayout
-    from legible_envs.tabletop.partner.interface import Senses
     from legible_envs.tabletop.task import TabletopTask
 
-__all__ = ["ReachWatcher", "make_predictor"]
+__all__ = ["IntentObserver", "Predictor", "make_intent_predictor"]
 
-_SUM_SLACK: Final = 1e-6
-_PEOPLE: Final = 3
+Predictor = StreamingPredictor | PrefixPredictor
+"""A predictor that an :class:`IntentObserver` can follow a reach with."""
 
-_plugins = Registry("predictor", "legible.predictors", {}, ValueError)
+_SUM_TOLERANCE: Final = 1e-6
+_PARTICIPANTS: Final = 3
+
+_registry = Registry(
+    "predictor",
+    "legible.predictors",
+    {"bayesian": "legible_envs.tabletop.partner.belief:BayesianIntent"},
+    ValueError,
+)
 
 
-def make_predictor(spec: Any) -> Any:
+def make_intent_predictor(spec: object = None) -> Predictor:
     """A predictor from what a user names.
 
     Args:
-        spec: None: the built-in Eq. 1. A text: ``"module:Class"``, or the name of an installed package's entry point in
-            group ``legible.predictors``; the class is made without arguments. Else the predictor itself: an object
-            whose ``stream(context).update(point, time)`` returns ``{goal: probability}``, or one with
-            ``predict_proba([prefix])`` and ``classes_``.
+        spec: None or ``"bayesian"``: the built-in Bayesian goal inference along shortest paths among the obstacles,
+            :class:`~legible_envs.tabletop.partner.belief.BayesianIntent` (the predictor that
+            ``predictors.list_predictors()`` calls ``bayesian`` knows kitchens only). Another text: a name in the entry
+            point group ``legible.predictors``, such as ``"reach-gaussian"``, or ``"module:Class"``; the class is made
+            without arguments. Else the predictor itself: an object whose ``stream(context).update(point, time)``
+            returns ``{goal: probability}``, or one with ``predict_proba([prefix])`` and ``classes_``.
 
     Raises:
         ValueError: It cannot be imported or made.
         TypeError: It is no predictor.
     """
     if spec is None:
-        return EqOne()
+        return BayesianIntent()
     predictor = spec
     if isinstance(spec, str):
-        factory = _plugins.resolve(spec)
+        factory = _registry.resolve(spec)
         try:
             predictor = factory()
         except Exception as error:
             raise ValueError(f"predictor {spec!r} cannot be made without arguments: {error}") from error
-    if isinstance(predictor, type) or not any(
-        callable(getattr(predictor, m, None)) for m in ("stream", "predict_proba")
-    ):
+    methods = ("stream", "predict_proba")
+    if isinstance(predictor, type) or not any(callable(getattr(predictor, method, None)) for method in methods):
         raise TypeError(
-            f"a predictor is an object with a method `stream` or `predict_proba`, 'module:Class' or None; got {spec!r}"
+            "a predictor is an object with a method `stream` or `predict_proba`, a name, 'module:Class' or None; "
+            f"got {spec!r}"
         )
-    return predictor
+    return predictor  # type: ignore[return-value]  # has one of the methods
 
 
-class ReachWatcher:
-    """What a predictor believes about the present reach of a person.
+class IntentObserver:
+    """Follows the reaches of a person with a predictor, which says how probable each goal is.
 
-    The predictor sees each reach from its beginning, in the order it happened and nothing of the future. Where the
-    valid goals change under way, the same reach is shown again with the new ones. What raises, or gives anything but
-    finite probabilities of the valid goals that sum to one, is reported once by a ``RuntimeWarning``; there is no
-    belief then until the next reach.
+    The predictor sees each reach from its beginning, in the order in which it happened and nothing of the future. Where
+    the valid goals change during a reach, the predictor sees this reach again with the new ones. An exception, or an
+    answer other than finite probabilities of the valid goals that sum to one, is reported once by a ``RuntimeWarning``;
+    there is no belief then until the next reach.
 
-    A predictor that is not fitted (it has ``fit`` but no ``classes_``) is fitted, in a copy, on simulated people who
-    build the task on this very table, always the same ones; and anew on each other table.
+    A predictor that must be fitted and is not (it has ``fit`` but no ``classes_``) is fitted, in a copy, on simulated
+    participants who build the task on this very table, always the same ones; and anew on each other table. To use
+    one that has learned from other trajectories, pass the fitted instance.
 
     Args:
-        predictor: See :func:`make_predictor`.
+        predictor: A predictor in any form that :func:`make_intent_predictor` takes.
 
     Attributes:
-        name: What the predictor is called in messages.
+        name: Name of the predictor in messages.
         failure: The first error of the predictor, or None.
     """
 
-    def __init__(self, predictor: Any = None) -> None:
-        self.name = predictor if isinstance(predictor, str) else None
-        self._given = make_predictor(predictor)
-        self.name = self.name or type(self._given).__name__
+    def __init__(self, predictor: object = None) -> None:
+        self._given = make_intent_predictor(predictor)
+        self._is_named = isinstance(predictor, str)
+        self.name = predictor if isinstance(predictor, str) else type(self._given).__name__
         self.failure: str | None = None
-        self._predictor: Any = None
-        self._fitted_on: tuple[Any, Any] | None = None
+        self._predictor: Predictor | None = None
+        self._fitted_on: tuple[TabletopLayout, TabletopTask] | None = None
         self._layout: TabletopLayout | None = None
         self._reach: _Reach | None = None
 
     def reset(self, layout: TabletopLayout, task: TabletopTask) -> None:
-        """Begin an episode on a table."""
+        """Begin an episode on a table.
+
+        Raises:
+            ValueError: A predictor that was given by name must be fitted, and cannot be fitted on simulated
+                participants at this table. (An instance that cannot be fitted is reported by a ``RuntimeWarning``.)
+        """
         self._layout = layout
         self._reach = None
         if not hasattr(self._given, "fit") or hasattr(self._given, "classes_"):
@@ -97,27 +113,38 @@ class ReachWatcher:
         elif self._fitted_on != (layout, task):
             self._predictor, self._fitted_on = None, (layout, task)
             try:
-                fitted = copy.deepcopy(self._given)
-                fitted.fit(_people_at(layout, task))
-                self._predictor = fitted
+                fitted: Any = copy.deepcopy(self._given)
+                fitted.fit(_simulated_reaches(layout, task))
             except Exception as error:
-                self._report(error)
+                self._refuse_unfitted(error)
+            else:
+                self._predictor = fitted
+
+    def _refuse_unfitted(self, error: Exception) -> None:
+        kind = type(self._given).__name__
+        reason = ValueError(
+            f"predictor {self.name} must be fitted, and fitting it on simulated participants at this table failed "
+            f"({type(error).__name__}: {error}); pass a fitted instance, such as predictor={kind}().fit(trajectories)"
+        )
+        if self._is_named:
+            self._fitted_on = None
+            raise reason from error
+        self._report(reason)
 
     def observe(self, senses: Senses) -> dict[str, float] | None:
         """``{goal: probability}`` now; None where there is no reach, no valid goal, or the predictor failed."""
         if not len(senses.reach) or not senses.goals or self._predictor is None or self._layout is None:
             return None
-        occasion = (senses.reach_number, frozenset(senses.goals))
+        occasion = _Occasion(senses.reach_number, frozenset(senses.goals))
         if self._reach is None or self._reach.occasion != occasion:
             self._reach = _Reach(occasion)
         if self._reach.failed:
             return None
         try:
             if self._reach.stream is None:
-                self._reach.stream = _open(self._predictor, _context(senses, self._layout))
+                self._reach.stream = _open_stream(self._predictor, _context(senses, self._layout))
             belief = self._reach.show(senses)
-            _check(belief, senses.goals)
-            return {goal: float(belief[goal]) for goal in senses.goals}
+            return _checked_belief(belief, senses.goals)
         except Exception as error:
             self._reach.failed = True
             self._report(error)
@@ -133,21 +160,29 @@ class ReachWatcher:
             )
 
 
+class _Occasion(NamedTuple):
+    """A reach and the goals that were valid."""
+
+    reach_number: int
+    goals: frozenset[str]
+
+
 @dataclass
 class _Reach:
     """One reach with one set of valid goals, as far as the predictor saw it."""
 
-    occasion: tuple[int, frozenset[str]]
-    stream: Any = None
-    belief: Any = None
+    occasion: _Occasion
+    stream: GoalStream | None = None
+    belief: object = None
     seen: int = 0
     failed: bool = False
 
-    def show(self, senses: Senses) -> Any:
-        """Show the predictor what it has not seen yet; the belief after it."""
-        # A copy, for a predictor may keep what it is shown.
+    def show(self, senses: Senses) -> object:
+        """Show the predictor the points it has not seen yet; the belief after the last."""
+        assert self.stream is not None
+        # A copy, since a predictor may keep what it is shown.
         states, times = senses.reach[self.seen :].copy(), senses.times[self.seen :].tolist()
-        # A stream may have `add`, which takes a point without the cost of a belief nobody asks for.
+        # A stream may have `add`, which takes a point without the cost of a belief that is not asked for.
         add = getattr(self.stream, "add", self.stream.update)
         for point, time in zip(states[:-1], times[:-1], strict=True):
             add(point, time)
@@ -160,17 +195,17 @@ class _Reach:
 class _PrefixStream:
     """A stream for predictors that only have ``predict_proba``."""
 
-    def __init__(self, predictor: Any, context: Trajectory) -> None:
+    def __init__(self, predictor: PrefixPredictor, context: Trajectory) -> None:
         self._predictor = predictor
         self._context = context
-        self._points: list[Any] = []
+        self._points: list[Floats] = []
         self._times: list[float] = []
 
-    def add(self, point: Any, time: float) -> None:
+    def add(self, point: Floats, time: float) -> None:
         self._points.append(point)
         self._times.append(time)
 
-    def update(self, point: Any, time: float) -> dict[str, float]:
+    def update(self, point: Floats, time: float) -> dict[str, float]:
         self.add(point, time)
         known = self._context
         prefix = Trajectory(
@@ -187,12 +222,15 @@ class _PrefixStream:
         return {goal: float(row[goal]) for goal in known.candidates}
 
 
-def _open(predictor: Any, context: Trajectory) -> Any:
-    return predictor.stream(context) if hasattr(predictor, "stream") else _PrefixStream(predictor, context)
+def _open_stream(predictor: Predictor, context: Trajectory) -> GoalStream:
+    # Not by isinstance: a protocol's check at run time takes several times as long.
+    if hasattr(predictor, "stream"):
+        return predictor.stream(context)
+    return _PrefixStream(predictor, context)
 
 
 def _context(senses: Senses, layout: TabletopLayout) -> Trajectory:
-    """What is known of a reach before its first point."""
+    """The facts of a reach that are known before its first point."""
     starts = layout.table.starts
     nearest = min(starts, key=lambda name: math.dist(starts[name], senses.start))
     rows = [layout.index(goal) for goal in senses.goals]
@@ -207,17 +245,18 @@ def _context(senses: Senses, layout: TabletopLayout) -> Trajectory:
     )
 
 
-def _check(belief: Any, goals: tuple[str, ...]) -> None:
+def _checked_belief(belief: object, goals: tuple[str, ...]) -> dict[str, float]:
     if not isinstance(belief, Mapping) or set(belief) != set(goals):
         raise ValueError(f"expected probabilities of {sorted(goals)}, got {belief!r}")
     values = [float(p) for p in belief.values()]
-    if not all(0 <= p < math.inf for p in values) or abs(math.fsum(values) - 1) > _SUM_SLACK:
+    if not all(0 <= p < math.inf for p in values) or abs(math.fsum(values) - 1) > _SUM_TOLERANCE:
         raise ValueError(f"expected probabilities that sum to one, got {dict(belief)!r}")
+    return {goal: float(belief[goal]) for goal in goals}
 
 
-def _people_at(layout: TabletopLayout, task: TabletopTask) -> list[Trajectory]:
-    """Reaches of a few simulated people who build the task."""
+def _simulated_reaches(layout: TabletopLayout, task: TabletopTask) -> list[Trajectory]:
+    """Reaches of a few simulated participants who build the task."""
     from legible_envs.tabletop.humans.simulation import sample_person, simulate_task
 
     rng = np.random.default_rng(0)
-    return [reach for _ in range(_PEOPLE) for reach in simulate_task(task, layout, sample_person(rng), rng)]
+    return [reach for _ in range(_PARTICIPANTS) for reach in simulate_task(layout, sample_person(rng), rng, task=task)]

@@ -1,15 +1,20 @@
-"""What a robot partner is told and what it answers; any object that takes the one and returns the other can be one."""
+"""The inputs and answers of partners and predictors: any object with these methods can take part."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Command", "Floats", "Senses", "State"]
+if TYPE_CHECKING:
+    from legible_envs.rollouts.trajectory import Trajectory
+    from legible_envs.tabletop.layout import TabletopLayout
+    from legible_envs.tabletop.task import TabletopTask
+
+__all__ = ["Command", "Floats", "GoalStream", "Partner", "PrefixPredictor", "Senses", "State", "StreamingPredictor"]
 
 Floats = npt.NDArray[np.float64]
 State = Literal["wait", "approach", "grasp", "carry", "place"]
@@ -17,7 +22,7 @@ State = Literal["wait", "approach", "grasp", "carry", "place"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Senses:
-    """What a robot knows when it is asked. Points are in metres, as in a layout; arrays are not to be written to.
+    """All that a robot knows when it decides. Points are in metres, as in a layout; arrays must not be written to.
 
     A *reach* begins when the person sets out with an empty hand and ends when they hold an object. While they hold
     one, ``reach``, ``times`` and ``start`` stay those of the reach that ended.
@@ -32,9 +37,9 @@ class Senses:
         goals: Objects the person may validly take now; empty while they hold one or must wait.
         free: Objects that lie free and that the robot may validly take now.
         positions: ``(n, 2)`` where the objects are now, in the order of the layout.
-        person_holding: What the person holds.
+        person_holding: Object in the person's hand.
         gripper: ``(2,)`` the robot's gripper now.
-        holding: What the robot holds.
+        holding: Object in the gripper.
     """
 
     time: float
@@ -53,19 +58,19 @@ class Senses:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Command:
-    """What a robot does until it is asked again.
+    """A robot's command, which holds until the next one.
 
     Attributes:
         velocity: ``(2,)`` of the gripper in m/s.
-        grasp: Object to close the gripper on now; it is within reach unless someone moved it. The next senses tell by
+        grasp: Object to close the gripper on now; it is within reach unless it was moved. The next senses tell by
             ``holding`` whether it was caught.
-        release: Whether to open the gripper now; what it held stays at its place in the configuration, if the gripper
+        release: Whether to open the gripper now; the object stays at its place in the configuration, if the gripper
             is there, else where it is dropped.
         target: Object the robot goes for or carries.
-        belief: ``{goal: probability}`` of the person's present reach; None where there is nothing to believe.
-        decided: Whether the robot is sure what the person goes for, or sees them hold it.
-        predicted: What that is; None where it is not sure.
-        state: What the robot is doing.
+        belief: ``{goal: probability}`` of the person's present reach; None where there is no belief.
+        decided: Whether the robot is sure of the person's goal, or sees them hold it.
+        predicted: That goal; None where it is not sure.
+        state: State of the robot.
         conflict: Whether the robot gave up its target just now because the person took it.
     """
 
@@ -78,3 +83,40 @@ class Command:
     predicted: str | None = None
     state: State = "wait"
     conflict: bool = False
+
+
+class Partner(Protocol):
+    """A robot that shares the table."""
+
+    def reset(self, layout: TabletopLayout, task: TabletopTask, rng: np.random.Generator) -> npt.ArrayLike | None:
+        """Begin an episode; ``(2,)`` where the gripper is, or None for the middle of the table's far side."""
+
+    def step(self, senses: Senses) -> Command:
+        """The command until the next call."""
+        ...
+
+
+class GoalStream(Protocol):
+    """The belief about one reach while it happens."""
+
+    def update(self, point: Floats, time: float) -> Mapping[str, float]:
+        """Move the hand to ``(2,)`` at a time in seconds; ``{goal: probability}``."""
+        ...
+
+
+class StreamingPredictor(Protocol):
+    """A predictor that follows a reach point by point."""
+
+    def stream(self, context: Trajectory) -> GoalStream:
+        """Open a stream for one reach; ``context`` has its layout, candidates and their places, and no states."""
+        ...
+
+
+class PrefixPredictor(Protocol):
+    """A predictor of observed parts of trajectories."""
+
+    classes_: Sequence[str]
+
+    def predict_proba(self, X: Sequence[Trajectory]) -> Floats:
+        """``(len(X), len(classes_))`` probabilities."""
+        ...

@@ -1,4 +1,4 @@
-"""A robot that shares the table: it waits until it is sure what the person reaches for, then takes something else.
+"""A robot that shares the table: it waits until it is sure of the person's goal, then takes another object.
 
 An environment calls :meth:`RobotPartner.step` with what the robot senses, and carries out the command that comes back:
 it moves the gripper, closes it on an object within reach, and opens it again. Any object with these two methods can
@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
 from legible_envs.tabletop.objects import Point, point
-from legible_envs.tabletop.partner.intent import ReachWatcher
+from legible_envs.tabletop.partner.intent import IntentObserver
 from legible_envs.tabletop.partner.interface import Command, Floats, Senses, State
 from legible_envs.tabletop.partner.steering import Steering
 
@@ -28,15 +28,29 @@ __all__ = ["RobotPartner"]
 _TIE: Final = 1e-9
 
 
+class _Prediction(NamedTuple):
+    """The belief about the present reach, and the goal the robot is sure of."""
+
+    belief: dict[str, float] | None
+    goal: str | None
+
+
+class _Jaws(NamedTuple):
+    """What the gripper does: the object to close on, or whether to open."""
+
+    grasp: str | None = None
+    release: bool = False
+
+
 class RobotPartner:
-    """A robot arm that works with a person and stays out of their way.
+    """A robot arm that works with a person and keeps clear of their hand.
 
     It waits at home until it is *sure*: until one goal is more probable than ``threshold``, or the person holds an
-    object. Then it takes another one, of those it may validly take the nearest to its gripper and never the one the
+    object. Then it takes another one: the nearest to its gripper of those it may validly take, never the one the
     person goes for; puts it at its place in the task's configuration; and goes on while it is sure. Its states:
 
     =========  ==================================================  ====================================================
-    state      what it does                                        what ends it
+    state      action                                              end of it
     =========  ==================================================  ====================================================
     wait       goes home and stays there                           sure, and there is another object: *approach*
     approach   goes to its target                                  there: *grasp*
@@ -50,16 +64,16 @@ class RobotPartner:
 
     **Motion.** A velocity that changes by at most ``acceleration``, straight to where it goes, over objects and virtual
     obstacles (these are projected for the person). It does not move nearer to the hand than ``clearance``: it slows
-    down before, goes round a hand in its way, waits beside one that rests where it must go, and backs off from one that
-    comes nearer. A hand faster than ``max_speed`` can still reach it, and keeping clear takes precedence over
+    down before, goes round a hand that blocks its path, waits beside one that rests at its target, and backs off from
+    one that comes nearer. A hand faster than ``max_speed`` can still reach it, and keeping clear takes precedence over
     ``acceleration``.
 
     All of it is deterministic.
 
     Args:
-        predictor: Who reads the person: None for the built-in Eq. 1 of the way among obstacles, a fitted predictor, or
-            ``"module:Class"``; see :class:`.ReachWatcher`, also for what happens when it
-            fails (the robot waits and the episode goes on).
+        predictor: Predicts the person's goals: None or ``"bayesian"`` for the built-in Bayesian goal inference along
+            shortest paths among obstacles, the name of another predictor, ``"module:Class"``, or a predictor; see
+            :class:`.IntentObserver`. Where it fails the robot waits and the episode goes on.
         threshold: Probability a goal must exceed, 0 to 1. 0: acts at once, on whatever goal is most probable (of tied
             ones the nearest to the hand); 1: never acts.
         rate: How often per second :meth:`step` is called.
@@ -75,12 +89,12 @@ class RobotPartner:
 
     Raises:
         ValueError: An argument out of range, or a predictor that cannot be imported.
-        TypeError: Something else than a predictor.
+        TypeError: An object that is no predictor.
     """
 
     def __init__(
         self,
-        predictor: Any = None,
+        predictor: object = None,
         *,
         threshold: float = 0.8,
         rate: float = 30.0,
@@ -99,22 +113,22 @@ class RobotPartner:
         self.grasp_time = _number("grasp_time", grasp_time, 0)
         self.clearance = _number("clearance", clearance, 0)
         self.home = None if home is None else point(home, "the robot's `home`")
-        self._watcher = ReachWatcher(predictor)
+        self._observer = IntentObserver(predictor)
 
     def __repr__(self) -> str:
-        return f"RobotPartner({self._watcher.name}, threshold={self.threshold!r}, max_speed={self.max_speed!r})"
+        return f"RobotPartner({self._observer.name}, threshold={self.threshold!r}, max_speed={self.max_speed!r})"
 
     @property
     def failure(self) -> str | None:
         """The first error of the predictor, or None."""
-        return self._watcher.failure
+        return self._observer.failure
 
     def reset(self, layout: TabletopLayout, task: TabletopTask, rng: np.random.Generator | None = None) -> Floats:
         """Begin an episode.
 
         Args:
             layout: The table, as the episode begins.
-            task: What is built; the robot takes only objects that have a place in its configuration.
+            task: The task; the robot takes only objects that have a place in its configuration.
             rng: Ignored: this robot does nothing at random.
 
         Returns:
@@ -126,7 +140,7 @@ class RobotPartner:
             raise ValueError(f"the robot's `home` at {self._home} is off the table of {width:g} x {depth:g} m")
         self._row = {name: row for row, name in enumerate(layout.goals)}
         self._place = {name: (float(x), float(y)) for name, (x, y) in task.configuration.items()}
-        self._watcher.reset(layout, task)
+        self._observer.reset(layout, task)
         self._state: State = "wait"
         self._target: str | None = None
         self._since = 0.0
@@ -135,16 +149,16 @@ class RobotPartner:
         return np.array(self._home)
 
     def step(self, senses: Senses) -> Command:
-        """What to do until the next call, 1 / ``rate`` seconds later."""
-        belief, predicted = self._read(senses)
+        """The command until the next call, 1 / ``rate`` seconds later."""
+        belief, predicted = self._predict(senses)
         conflict = self._revise(senses, predicted)
         gripper = _pair(senses.gripper)
         there = self._destination(senses, gripper)
-        grasp, release = self._work(senses.time, math.dist(there, gripper))
+        jaws = self._work(senses.time, math.dist(there, gripper))
         return Command(
             velocity=np.array(self._steering.towards(there, gripper, _pair(senses.hand))),
-            grasp=grasp,
-            release=release,
+            grasp=jaws.grasp,
+            release=jaws.release,
             target=self._target,
             belief=belief,
             decided=predicted is not None,
@@ -153,17 +167,16 @@ class RobotPartner:
             conflict=conflict,
         )
 
-    # -- what the person does ------------------------------------------------------------------------------------------
+    # -- the person --------------------------------------------------------------------------------------------------
 
-    def _read(self, senses: Senses) -> tuple[dict[str, float] | None, str | None]:
-        """The belief, and the goal the robot is sure of."""
+    def _predict(self, senses: Senses) -> _Prediction:
         if senses.person_holding is not None:
             self._ended_reach = senses.reach_number
-            return None, senses.person_holding if self.threshold < 1 else None
+            return _Prediction(None, senses.person_holding if self.threshold < 1 else None)
         if senses.reach_number == self._ended_reach:
-            return None, None
-        belief = self._watcher.observe(senses)
-        return belief, None if belief is None else self._sure_of(belief, senses)
+            return _Prediction(None, None)
+        belief = self._observer.observe(senses)
+        return _Prediction(belief, None if belief is None else self._sure_of(belief, senses))
 
     def _sure_of(self, belief: Mapping[str, float], senses: Senses) -> str | None:
         most = max(belief.values())
@@ -175,10 +188,10 @@ class RobotPartner:
         hand = _pair(senses.hand)
         return min(top, key=lambda goal: math.dist(hand, senses.positions[self._row[goal]]))
 
-    # -- what the robot does -------------------------------------------------------------------------------------------
+    # -- the robot ----------------------------------------------------------------------------------------------------
 
     def _revise(self, senses: Senses, predicted: str | None) -> bool:
-        """Change state for what happened in the world; whether the person took the target."""
+        """Change state after events in the world; whether the person took the target."""
         if senses.holding is not None and self._state not in ("carry", "place"):
             self._state, self._target = "carry", senses.holding
         elif senses.holding is None and self._state in ("carry", "place"):
@@ -204,23 +217,23 @@ class RobotPartner:
         if self._state == "wait" or self._target is None:
             return self._home
         if self._state in ("carry", "place"):
-            # What has no place, and came into the gripper by other hands, is put down where it is.
+            # An object without a place, which came into the gripper by other hands, is put down here.
             return self._place.get(self._target, gripper)
         return _pair(senses.positions[self._row[self._target]])
 
-    def _work(self, time: float, distance: float) -> tuple[str | None, bool]:
-        """Close or open the gripper where it is time to: what to grasp, and whether to release."""
+    def _work(self, time: float, distance: float) -> _Jaws:
+        """Close or open the gripper when it is time to."""
         if self._state == "wait":
-            return None, False
+            return _Jaws()
         if distance > self.reach:
             self._state = "approach" if self._state in ("approach", "grasp") else "carry"
-            return None, False
+            return _Jaws()
         if self._state in ("approach", "carry"):
             self._state = "grasp" if self._state == "approach" else "place"
             self._since = time
         if time - self._since < self.grasp_time - 0.5 / self.rate:
-            return None, False
-        return (self._target, False) if self._state == "grasp" else (None, True)
+            return _Jaws()
+        return _Jaws(grasp=self._target) if self._state == "grasp" else _Jaws(release=True)
 
 
 def _pair(array: Floats) -> Point:
@@ -228,9 +241,10 @@ def _pair(array: Floats) -> Point:
     return x, y
 
 
-def _number(name: str, value: Any, least: float, most: float = math.inf) -> float:
-    ok = isinstance(value, int | float) and not isinstance(value, bool) and least <= value <= most and value < math.inf
-    if not ok:
+def _number(name: str, value: object, least: float, most: float = math.inf) -> float:
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    number = float(value) if is_number else math.nan  # type: ignore[arg-type]
+    if not least <= number <= most or number == math.inf:
         wanted = f"{least:g} to {most:g}" if most < math.inf else f"a finite number >= {least:g}"
         raise ValueError(f"the robot's `{name}` must be {wanted}, got {value!r}")
-    return float(value)
+    return number

@@ -1,4 +1,4 @@
-"""How a gripper gets from here to there beside a moving hand: smooth, at limited speed, and clear of it."""
+"""Velocity commands that bring a gripper to a point: smooth, at limited speed, and clear of a moving hand."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from legible_envs.tabletop.objects import Point
 
 __all__ = ["Steering"]
 
-_LOOK_AHEAD: Final = 0.20  # metres; of a hand farther away nobody knows where it will be
+_LOOK_AHEAD: Final = 0.20  # metres; where a hand farther away will be is not known
 _MARGIN: Final = 0.01  # metres beyond the clearance when going round
 
 
@@ -33,7 +33,7 @@ class Steering:
     velocity: Point = (0.0, 0.0)
 
     def towards(self, there: Point, gripper: Point, hand: Point) -> Point:
-        """The next velocity command on the way to a point."""
+        """The next velocity command towards a point."""
         x, y = self._wanted(there, gripper, hand)
         dx, dy = x - self.velocity[0], y - self.velocity[1]
         share = min(1.0, self.acceleration / self.rate / max(math.hypot(dx, dy), 1e-12))
@@ -42,7 +42,7 @@ class Steering:
         return self.velocity
 
     def _wanted(self, there: Point, gripper: Point, hand: Point) -> Point:
-        """Straight there, slowing down before; round a hand that is near and in the way."""
+        """Straight there, slowing down before; round a near hand that blocks the path."""
         dx, dy = there[0] - gripper[0], there[1] - gripper[1]
         distance = math.hypot(dx, dy)
         if distance == 0.0:
@@ -64,7 +64,7 @@ class Steering:
         return speed * math.cos(direction), speed * math.sin(direction)
 
     def _kept_clear(self, velocity: Point, gripper: Point, hand: Point) -> Point:
-        """The velocity without what would bring the gripper too near to the hand, or with what takes it away."""
+        """The velocity without the part that brings the gripper too near to the hand, or with one that leads away."""
         rx, ry = gripper[0] - hand[0], gripper[1] - hand[1]
         away = math.hypot(rx, ry)
         # From right under it: away from where the person sits.

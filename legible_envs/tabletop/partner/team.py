@@ -1,4 +1,4 @@
-"""Who watches and who helps at the table: a predictor that only believes, or a robot that also acts."""
+"""The person's team at the table: an observer that only believes, or a robot that also acts."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ import numpy.typing as npt
 from legible_envs.support.plugins import import_target
 from legible_envs.tabletop.game.game import DT, RATE, TableGame
 from legible_envs.tabletop.partner.fluency import TeamMetrics, tick_of
-from legible_envs.tabletop.partner.intent import ReachWatcher
-from legible_envs.tabletop.partner.interface import Command, Senses
+from legible_envs.tabletop.partner.intent import IntentObserver
+from legible_envs.tabletop.partner.interface import Command, Partner, Senses
 from legible_envs.tabletop.partner.robot import RobotPartner
 
-__all__ = ["GRIPPER_SPEED", "MEASURES", "Team", "make_partner", "read_predictor"]
+__all__ = ["GRIPPER_SPEED", "MEASURES", "Team", "make_partner"]
 
 GRIPPER_SPEED: Final = 1.0
 """No gripper is faster, m/s."""
@@ -42,18 +42,13 @@ MEASURES: Final = (
 _IDLE_SPEED: Final = 0.01
 
 
-def read_predictor(spec: Any) -> Any:
-    """What :class:`.ReachWatcher` takes for what a user names; ``"eq1"`` is built in."""
-    return None if isinstance(spec, str) and spec == "eq1" else spec
-
-
-def make_partner(spec: Any, predictor: Any, threshold: float) -> Any:
+def make_partner(spec: object, predictor: object, threshold: float) -> Partner:
     """A robot partner from what a user names.
 
     Args:
         spec: ``"robot"``; a mapping of arguments of :class:`~legible_envs.tabletop.partner.robot.RobotPartner`;
             ``"module:Class"``, made without arguments; or an object with ``reset`` and ``step``, which is copied.
-        predictor: What a ``RobotPartner`` reads the person with.
+        predictor: The predictor of a ``RobotPartner``.
         threshold: Of a ``RobotPartner``.
 
     Raises:
@@ -64,7 +59,7 @@ def make_partner(spec: Any, predictor: Any, threshold: float) -> Any:
         spec = {}
     if isinstance(spec, Mapping):
         try:
-            return RobotPartner(read_predictor(predictor), **{"threshold": threshold, "rate": float(RATE), **spec})
+            return RobotPartner(predictor, **{"threshold": threshold, "rate": float(RATE), **spec})
         except TypeError as error:
             raise ValueError(f"`partner` has arguments that RobotPartner does not take: {error}") from error
     if predictor is not None:
@@ -78,17 +73,17 @@ def make_partner(spec: Any, predictor: Any, threshold: float) -> Any:
             raise ValueError(f"partner {spec!r} cannot be made: {type(error).__name__}: {error}") from error
     if isinstance(spec, type) or not all(callable(getattr(spec, name, None)) for name in ("reset", "step")):
         raise TypeError(f"a partner is an object with the methods `reset` and `step`, got {spec!r}")
-    return copy.deepcopy(spec)
+    return copy.deepcopy(spec)  # type: ignore[return-value]  # has the methods
 
 
 class Team:
-    """What shares the table with the person.
+    """A robot or an observer that shares the table with the person.
 
-    Time goes in ticks: at the end of each, whoever watches senses; a robot's command holds for the next tick.
+    Time goes in ticks: the team senses at the end of each; a robot's command holds for the next tick.
 
     Args:
         partner: As of :func:`make_partner`, or None.
-        watcher: Used where there is no partner; may be None too.
+        observer: Used where there is no partner; may be None too.
 
     Attributes:
         gripper: ``(x, y)``, or None where there is no robot.
@@ -97,9 +92,9 @@ class Team:
         belief: ``{goal: probability}`` of the present reach, or None.
     """
 
-    def __init__(self, partner: Any = None, watcher: ReachWatcher | None = None) -> None:
+    def __init__(self, partner: Partner | None = None, observer: IntentObserver | None = None) -> None:
         self.partner = partner
-        self.watcher = watcher
+        self.observer = observer
         self.gripper: tuple[float, float] | None = None
         self.velocity = (0.0, 0.0)
         self.command: Command | None = None
@@ -110,13 +105,13 @@ class Team:
 
     @property
     def is_there(self) -> bool:
-        """Whether anybody watches."""
-        return self.partner is not None or self.watcher is not None
+        """Whether there is a partner or an observer."""
+        return self.partner is not None or self.observer is not None
 
     def begin(self, game: TableGame, rng: np.random.Generator) -> None:
         """Begin an episode."""
-        if self.watcher is not None:
-            self.watcher.reset(game.layout, game.task)
+        if self.observer is not None:
+            self.observer.reset(game.layout, game.task)
         if self.partner is not None:
             at = self.partner.reset(game.layout, game.task, rng)
             self.gripper = self._home(game) if at is None else _pair(at, "what a partner's `reset` returns")
@@ -142,7 +137,7 @@ class Team:
         return done
 
     def log(self, game: TableGame, has_acted: bool) -> None:
-        """Note what the tick that ends now was like.
+        """Add the tick that ends now to the log.
 
         Args:
             game: As it is at the end of the tick.
@@ -163,12 +158,12 @@ class Team:
             self._senses, self.command = senses, self.partner.step(senses)
             belief = self.command.belief
         else:
-            assert self.watcher is not None
-            belief = self.watcher.observe(senses) if senses.person_holding is None or senses.goals else None
+            assert self.observer is not None
+            belief = self.observer.observe(senses) if senses.person_holding is None or senses.goals else None
         self.belief = None if belief is None else {goal: float(p) for goal, p in belief.items()}
 
     def info(self) -> dict[str, Any]:
-        """What ``info`` says about belief and robot; None where a measure is not known yet."""
+        """The part of ``info`` about belief and robot; None where a measure is not known yet."""
         if not self.is_there:
             return {}
         # A mapping in any case: vector environments cannot stack one with None.

@@ -10,8 +10,8 @@ Example:
 """
 
 from legible_envs.drawing.sheets import save_png
-from legible_envs.tabletop.rendering.boards import draw_boards, draw_configuration
+from legible_envs.tabletop.rendering.panels import draw_configuration, draw_panels
 from legible_envs.tabletop.rendering.scene import draw_scene, scene_shape
 from legible_envs.tabletop.rendering.table import draw_table
 
-__all__ = ["draw_boards", "draw_configuration", "draw_scene", "draw_table", "save_png", "scene_shape"]
+__all__ = ["draw_configuration", "draw_panels", "draw_scene", "draw_table", "save_png", "scene_shape"]

@@ -65,7 +65,7 @@ def draw_glyph(canvas: Canvas, shape: str, x: float, y: float, size: float, turn
     """Draw a shape about ``size`` units across round a point.
 
     Args:
-        canvas: What to draw on.
+        canvas: The canvas to draw on.
         shape: One of :data:`GLYPHS`, ``"ring"`` or ``"bin"``; of any other word nothing is drawn here, see
             :func:`initial`.
         x: Centre.
@@ -73,7 +73,7 @@ def draw_glyph(canvas: Canvas, shape: str, x: float, y: float, size: float, turn
         size: Units.
         turn: Radians, counter-clockwise.
         ink: Colour.
-        ground: Colour of what lies under it.
+        ground: Colour of the ground under it.
     """
     cosine, sine = math.cos(turn) * size, math.sin(turn) * size
 

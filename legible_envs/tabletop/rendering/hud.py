@@ -1,4 +1,4 @@
-"""The strip above a table in use: time, what is done, crossings, and what the robot is doing."""
+"""The strip above a table in use: time, objects placed, crossings, and the robot's state."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def hud_height(width: int) -> int:
 
 
 def draw_hud(view: TableView, strip: Image) -> None:
-    """Fill the ``(hud_height(width), width, 3)`` strip; what has no room is left out."""
+    """Fill the ``(hud_height(width), width, 3)`` strip; words without room are left out."""
     height, width = strip.shape[:2]
     strip[...] = rgb(TABLE["hud"])
     strip[-max(1, height // 16) :] = rgb(mix(TABLE["hud"], "#000000", 0.35))
@@ -47,7 +47,7 @@ def draw_hud(view: TableView, strip: Image) -> None:
 
 
 def robot_words(view: TableView) -> str:
-    """What the robot is doing, in a few words; empty where there is none."""
+    """The robot's state in a few words; empty where there is none."""
     if view.robot is None:
         return ""
     if view.robot_holding is not None:

@@ -19,16 +19,16 @@ __all__ = ["colour_of", "outline", "paste_centred", "paste_object"]
 _TURN: Final = math.radians(2.0)  # angles are drawn to this step, so that sprites can be kept
 
 
-def colour_of(thing: TableObject) -> str:
+def colour_of(obj: TableObject) -> str:
     """The colour of an object as ``#rrggbb``.
 
     Raises:
         ValueError: It has none that can be drawn.
     """
     try:
-        return hex_of(thing.colour)
+        return hex_of(obj.colour)
     except ValueError as error:
-        raise ValueError(f"object {thing.name!r}: {error}") from None
+        raise ValueError(f"object {obj.name!r}: {error}") from None
 
 
 def outline(
@@ -57,7 +57,7 @@ def paste_centred(image: Image, sprite: Sprite, column: float, row: float) -> No
 def paste_object(
     image: Image,
     frame: Frame,
-    thing: TableObject,
+    obj: TableObject,
     x: float,
     y: float,
     angle: float | None = None,
@@ -68,22 +68,22 @@ def paste_object(
     """Draw an object with its centre at a point on the table.
 
     Args:
-        image: What to draw on.
+        image: The image to draw on.
         frame: Where the table lies in it.
-        thing: The object: its colour, shape and size.
+        obj: The object: its colour, shape and size.
         x: Metres.
         y: Metres.
         angle: Radians; the object's own if None.
         faded: Whether it does not matter now.
         lifted: Whether it is carried, and throws a longer shadow.
     """
-    turn = thing.angle if angle is None else float(angle)
+    turn = obj.angle if angle is None else float(angle)
     sprite = _sprite(
-        colour_of(thing),
-        thing.shape,
-        thing.size,
+        colour_of(obj),
+        obj.shape,
+        obj.size,
         round(turn / _TURN),
-        thing.movable,
+        obj.movable,
         faded,
         lifted,
         round(frame.scale * 64),

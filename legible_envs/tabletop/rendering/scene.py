@@ -1,4 +1,4 @@
-"""A table in use: the hand, the robot's gripper, what they carry, and what the robot believes."""
+"""A table in use: the hand, the robot's gripper, the objects they carry, and the robot's belief."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _BAR: Final = (0.058, 0.012)
 
 
 def scene_shape(view: TableView, *, width: int = 640, hud: bool = True) -> tuple[int, int, int]:
-    """The shape of what :func:`draw_scene` returns."""
+    """The shape of the picture that :func:`draw_scene` returns."""
     frame = Frame.of(view.layout.table, check_width(width))
     return frame.height + (hud_height(frame.width) if hud else 0), frame.width, 3
 
@@ -32,9 +32,9 @@ def scene_shape(view: TableView, *, width: int = 640, hud: bool = True) -> tuple
 def draw_scene(view: TableView, *, width: int = 640, hud: bool = True) -> Image:
     """Draw a table in use.
 
-    What the person may take now stands out from what they may not; a ring marks what they are going for, where that is
-    known, and another what the robot is going for. Over each object is a bar, as long as the robot believes in it, with
-    a mark at the threshold; it turns from amber to green, and gets a dark frame, where the threshold is passed.
+    Objects that the person may take now stand out from the others; a ring marks the object they are going for, where
+    that is known, and another the robot's target. A bar over each object shows its probability as the robot sees it,
+    with a mark at the threshold; above the threshold it turns from amber to green and gets a dark frame.
 
     Args:
         view: The table, for instance from ``env.unwrapped.view()``.
@@ -82,7 +82,7 @@ def _check(view: TableView) -> None:
 
 
 def _draw_trail(image: Image, frame: Frame, view: TableView) -> None:
-    """Dots at equal distances along the way, the older the paler."""
+    """Dots at equal distances along the path of the hand, the older the paler."""
     trail = np.asarray(view.trail, dtype=np.float64).reshape(-1, 2)
     trail = trail[np.isfinite(trail).all(axis=1)]
     if len(trail) < 2:
@@ -100,16 +100,16 @@ def _draw_trail(image: Image, frame: Frame, view: TableView) -> None:
 
 
 def _draw_lying(image: Image, frame: Frame, view: TableView) -> None:
-    """Objects that nobody carries; those not to be taken now are paler."""
-    for i, thing in enumerate(view.layout.objects):
+    """Objects on the table; those that the person may not take now are paler."""
+    for i, obj in enumerate(view.layout.objects):
         if view.status[i] in ("free", "placed"):
-            faded = view.status[i] == "free" and bool(view.goals) and thing.name not in view.goals
+            faded = view.status[i] == "free" and bool(view.goals) and obj.name not in view.goals
             x, y = view.positions[i]
-            paste_object(image, frame, thing, x, y, view.angles[i], faded=faded)
+            paste_object(image, frame, obj, x, y, view.angles[i], faded=faded)
 
 
 def _draw_marks(image: Image, frame: Frame, view: TableView) -> None:
-    """Rings round what the person and what the robot are going for."""
+    """Rings round the person's goal and the robot's target."""
     thick = max(2, round(0.0045 * frame.scale))
     for name, colour, grow in ((view.goal, TABLE["skin_line"], 0.008), (view.robot_target, TABLE["robot"], 0.015)):
         if name is None or name not in view.layout.goals:
@@ -129,9 +129,9 @@ def _draw_robot(image: Image, frame: Frame, view: TableView) -> None:
     opening = 0.066
     if view.robot_holding is not None:
         i = view.layout.index(view.robot_holding)
-        thing = view.layout.objects[i]
-        paste_object(image, frame, thing, x, y, view.angles[i], lifted=True)
-        opening = min(thing.size) + 0.004
+        obj = view.layout.objects[i]
+        paste_object(image, frame, obj, x, y, view.angles[i], lifted=True)
+        opening = min(obj.size) + 0.004
     sprite = gripper_sprite(round(opening, 3), round(frame.scale * 64))
     paste_centred(image, sprite, *frame.pixel(x, y))
 
@@ -175,6 +175,6 @@ def _draw_bar(image: Image, left: int, top: int, wide: int, tall: int, value: fl
 
 
 def _fill(image: Image, left: int, top: int, wide: int, tall: int, colour: str) -> None:
-    """A filled rectangle; what lies outside is cut off."""
+    """A filled rectangle, cut off at the edges of the image."""
     right, bottom = max(left + wide, 0), max(top + tall, 0)
     image[max(top, 0) : bottom, max(left, 0) : right] = rgb(colour)

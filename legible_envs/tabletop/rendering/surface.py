@@ -1,4 +1,4 @@
-"""What does not move while a table is used: its top, region and slots, the starts of the hand, virtual obstacles."""
+"""The still parts of a table: its top, region and slots, the starts of the hand, virtual obstacles."""
 
 from __future__ import annotations
 
@@ -70,13 +70,13 @@ def _draw_top(canvas: Canvas, frame: Frame, table: Table) -> None:
 def _draw_slots(canvas: Canvas, frame: Frame, task: TabletopTask) -> None:
     line = max(0.0016, 0.9 / frame.scale)
     for name, (x, y) in task.configuration.items():
-        thing = task.layout.objects[task.layout.index(name)]
+        obj = task.layout.objects[task.layout.index(name)]
         for grow, colour in ((0.004, TABLE["slot_line"]), (0.004 - 2 * line, TABLE["slot"])):
-            long, wide = (frame.length(side + grow) for side in thing.size)
-            canvas.polygon(outline(*frame.unit(x, y), long, wide, thing.angle, frame.length(0.006)), colour)
-        faint = mix(colour_of(thing), TABLE["slot"], 0.68)
-        size = 0.62 * frame.length(min(thing.size))
-        draw_glyph(canvas, thing.shape, *frame.unit(x, y), size, thing.angle, faint, TABLE["slot"])
+            long, wide = (frame.length(side + grow) for side in obj.size)
+            canvas.polygon(outline(*frame.unit(x, y), long, wide, obj.angle, frame.length(0.006)), colour)
+        faint = mix(colour_of(obj), TABLE["slot"], 0.68)
+        size = 0.62 * frame.length(min(obj.size))
+        draw_glyph(canvas, obj.shape, *frame.unit(x, y), size, obj.angle, faint, TABLE["slot"])
 
 
 def _draw_start(canvas: Canvas, frame: Frame, x: float, y: float, hand: float) -> None:

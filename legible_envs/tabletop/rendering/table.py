@@ -1,4 +1,4 @@
-"""Tables with nobody at them: a layout, the ways of the hand, and where its goal is in doubt."""
+"""Tables at rest: a layout, the shortest paths of the hand, and where its goal is ambiguous."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from legible_envs.drawing.canvas import Canvas, Image, mix, paste, rgb, text_spr
 from legible_envs.drawing.palette import HEAT
 from legible_envs.drawing.sheets import banner
 from legible_envs.tabletop.layout import TabletopLayout
-from legible_envs.tabletop.rendering.doubt import doubtful_reaches
+from legible_envs.tabletop.rendering.ambiguity import ambiguous_reaches
 from legible_envs.tabletop.rendering.frame import Frame, check_width
 from legible_envs.tabletop.rendering.objects import paste_centred, paste_object
 from legible_envs.tabletop.rendering.palette import TABLE
 from legible_envs.tabletop.rendering.surface import surface_of
 from legible_envs.tabletop.task import TabletopTask
 
-__all__ = ["draw_doubt_scale", "draw_table", "heat_colour"]
+__all__ = ["draw_ambiguity_scale", "draw_table", "heat_colour"]
 
 Floats = npt.NDArray[np.float64]
 _PIECES: Final = 48
@@ -32,24 +32,24 @@ def draw_table(
     task: TabletopTask | None = None,
     width: int = 640,
     paths: bool | str | Iterable[str] = False,
-    doubt: bool = False,
+    ambiguity: bool = False,
     beta: float = 20.0,
     scale: bool = True,
     grown: bool = False,
     labels: Mapping[str, str] | None = None,
     title: str | None = None,
 ) -> Image:
-    """Draw a table with nobody at it.
+    """Draw a table at rest, without hand or robot.
 
     Args:
-        layout: The table and what lies on it.
-        task: What is built there; its slots are drawn in the assembly zone.
+        layout: The table and the objects on it.
+        task: The task; its slots are drawn in the assembly zone.
         width: Pixels, 120 to 4096.
         paths: Shortest paths to draw: from all starts (True), or from the starts (or objects) named.
-        doubt: Whether to colour the shortest reaches of the task by how unsure an observer is of their goal there
-            (Eq. 1, the mean over the task's stages).
-        beta: Rationality per metre, of ``doubt``.
-        scale: Whether to say below what the colours of ``doubt`` mean.
+        ambiguity: Whether to colour the shortest reaches of the task by how unsure an observer is of their goal at each
+            point (Bayesian goal inference, Eq. 1, the mean over the task's stages).
+        beta: Rationality per metre, of ``ambiguity``.
+        scale: Whether to explain the colours of ``ambiguity`` below the drawing.
         grown: Whether to show where an obstacle keeps the centre of the hand away.
         labels: Short texts to set above objects, by name.
         title: A line above the drawing.
@@ -58,24 +58,26 @@ def draw_table(
         ``(height, width, 3)`` uint8, the table's depth to scale; higher with a title or a scale. A new array each time.
 
     Raises:
-        ValueError: A width out of range, an object whose colour is none, or ``doubt`` without a task.
+        ValueError: A width out of range, an object whose colour is none, or ``ambiguity`` without a task.
         LayoutError: A start or an object of this name is not there.
     """
     frame = Frame.of(layout.table, check_width(width))
-    if doubt and task is None:
-        raise ValueError("doubt is about the reaches of a task: give task=, such as TabletopTask.named('columns')")
+    if ambiguity and task is None:
+        raise ValueError(
+            "ambiguity is a property of the reaches of a task: give task=, such as TabletopTask.named('columns')"
+        )
     image = surface_of(layout, task, frame.width, grown=grown).copy()
     if paths:
         starts = list(layout.table.starts) if paths is True else [paths] if isinstance(paths, str) else list(paths)
         _draw_paths(image, frame, layout, starts)
-    if doubt and task is not None:
-        _draw_doubt(image, frame, layout, task, beta)
-    for thing in layout.objects:
-        paste_object(image, frame, thing, *thing.at)
+    if ambiguity and task is not None:
+        _draw_ambiguity(image, frame, layout, task, beta)
+    for obj in layout.objects:
+        paste_object(image, frame, obj, *obj.at)
     for name, text in (labels or {}).items():
         _draw_label(image, frame, layout, name, text)
-    if doubt and scale:
-        image = np.concatenate([image, draw_doubt_scale(frame.width)])
+    if ambiguity and scale:
+        image = np.concatenate([image, draw_ambiguity_scale(frame.width)])
     return banner(image, title, max(28, frame.width // 14)) if title else image
 
 
@@ -100,13 +102,13 @@ def heat_colour(value: float) -> str:
     return mix(HEAT[below], HEAT[below + 1], place - below)
 
 
-def _draw_doubt(image: Image, frame: Frame, layout: TabletopLayout, task: TabletopTask, beta: float) -> None:
-    """Every reach as a ribbon, the clearest first, so that doubt lies on top."""
+def _draw_ambiguity(image: Image, frame: Frame, layout: TabletopLayout, task: TabletopTask, beta: float) -> None:
+    """Every reach as a ribbon, the clearest pieces first, so that ambiguous ones lie on top."""
     canvas, unit = Canvas(frame.width, tall=frame.height / frame.width), max(1.0, frame.width / 640) / frame.width
     pieces = [
         (float(value), [frame.unit(*a), frame.unit(*b)])
-        for reach in doubtful_reaches(layout, task, beta=beta, pieces=_PIECES)
-        for value, (a, b) in zip(reach.doubt, itertools.pairwise(reach.points.tolist()), strict=True)
+        for reach in ambiguous_reaches(layout, task, beta=beta, pieces=_PIECES)
+        for value, (a, b) in zip(reach.ambiguity, itertools.pairwise(reach.points.tolist()), strict=True)
     ]
     for _, line in pieces:
         canvas.stroke(line, 5.4 * unit, TABLE["rim"])
@@ -115,12 +117,12 @@ def _draw_doubt(image: Image, frame: Frame, layout: TabletopLayout, task: Tablet
     paste(image, canvas.sprite(), 0, 0)
 
 
-def draw_doubt_scale(width: int) -> Image:
-    """A strip that says what the colours of doubt mean, ``(h, width, 3)``."""
+def draw_ambiguity_scale(width: int) -> Image:
+    """A strip that explains the colours of ambiguity, ``(h, width, 3)``."""
     size = max(13, min(24, round(width * 0.03)))
     strip = np.empty((round(size * 1.7), width, 3), np.uint8)
     strip[...] = rgb(TABLE["page"])
-    words = [text_sprite(text, size, TABLE["ink"]) for text in ("the goal is plain", "in doubt")]
+    words = [text_sprite(text, size, TABLE["ink"]) for text in ("the goal is clear", "ambiguous")]
     bar = max(24, round(width * 0.25))
     left = (width - bar - sum(word.colour.shape[1] for word in words) - 2 * size) // 2
     for word, at in zip(words, (left, left + words[0].colour.shape[1] + 2 * size + bar), strict=True):
@@ -134,7 +136,7 @@ def draw_doubt_scale(width: int) -> Image:
 
 
 def _draw_label(image: Image, frame: Frame, layout: TabletopLayout, name: str, text: str) -> None:
-    thing = layout.objects[layout.index(name)]
+    obj = layout.objects[layout.index(name)]
     words = text_sprite(text, max(10, round(0.034 * frame.scale)), TABLE["ink"])
-    column, row = frame.pixel(*thing.at)
-    paste_centred(image, words, column, row - (thing.size[1] / 2 + 0.02) * frame.scale)
+    column, row = frame.pixel(*obj.at)
+    paste_centred(image, words, column, row - (obj.size[1] / 2 + 0.02) * frame.scale)

@@ -15,9 +15,9 @@ SPEED = 1.2
 def towards(env, point, speed=SPEED):
     """The action that takes the hand towards a point, slower when it is near."""
     game = env.unwrapped
-    way = np.asarray(point) - game.hand
-    distance = np.hypot(*way)
-    velocity = way * 8 * min(1.0, speed / max(8 * distance, 1e-12))
+    offset = np.asarray(point) - game.hand
+    distance = np.hypot(*offset)
+    velocity = offset * 8 * min(1.0, speed / max(8 * distance, 1e-12))
     return (velocity / game.max_speed).astype(np.float32)
 
 
@@ -27,8 +27,8 @@ def next_point(env, goal):
     paths = game.layout.paths
     if not game.layout.obstacles:
         return game.positions[game.layout.index(goal)]
-    way = paths.polyline(paths.nearest_free([game.hand])[0], goal)
-    return way[1] if math.dist(way[0], way[1]) > 1e-3 or len(way) < 3 else way[2]
+    path = paths.polyline(paths.nearest_free([game.hand])[0], goal)
+    return path[1] if math.dist(path[0], path[1]) > 1e-3 or len(path) < 3 else path[2]
 
 
 def go_to(env, point, limit=120, near=1e-3, speed=SPEED):
@@ -67,8 +67,9 @@ class Player:
         game = env.unwrapped
         if game.carry_to is not None:
             return towards(env, game.carry_to)
-        if self.goal not in game.goals:
-            self.goal = str(self.rng.choice(game.goals)) if game.goals else None
+        goals = game.valid_goal_names()
+        if self.goal not in goals:
+            self.goal = str(self.rng.choice(goals)) if goals else None
         if self.goal is None:
             return np.zeros(2, dtype=np.float32)
         return towards(env, next_point(env, self.goal))
@@ -126,9 +127,9 @@ class Grabber:
             self.left = [name for name in self.left if name in senses.free]
             target = self.left[0] if self.left else None
             there = senses.gripper if target is None else senses.positions[self.layout.index(target)]
-        way = np.asarray(there) - senses.gripper
-        distance = float(np.hypot(*way))
-        velocity = way * min(30.0, self.speed / max(distance, 1e-12))
+        offset = np.asarray(there) - senses.gripper
+        distance = float(np.hypot(*offset))
+        velocity = offset * min(30.0, self.speed / max(distance, 1e-12))
         is_near = distance < 0.005
         drop = senses.holding is not None and (is_near or self.carried == self.drop_after)
         if drop and self.carried == self.drop_after:

@@ -122,10 +122,10 @@ class Team:
             self.held, self.goal = self.goal, None
 
     def go(self, there):
-        way = there - self.hand
-        distance = float(np.hypot(*way))
+        offset = there - self.hand
+        distance = float(np.hypot(*offset))
         step = self.hand_speed / RATE
-        self.hand = there.copy() if distance <= step else self.hand + way / distance * step
+        self.hand = there.copy() if distance <= step else self.hand + offset / distance * step
         return distance <= step
 
     def move_robot(self, command):

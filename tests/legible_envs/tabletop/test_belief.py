@@ -11,7 +11,7 @@ from legible_envs.errors import LayoutError
 from legible_envs.legibility import posterior
 from legible_envs.rollouts import Trajectory
 from legible_envs.tabletop import TableObject, TabletopLayout, TabletopTask, VirtualObstacle
-from legible_envs.tabletop.partner.belief import EqOne, EqOneBelief
+from legible_envs.tabletop.partner.belief import BayesianIntent, GoalBelief
 from tests.oracles.table_oracle import PathOracle
 
 HOME = (0.60, 0.05)
@@ -52,25 +52,25 @@ def test_it_is_equation_1_with_independent_paths():
         expected = posterior(
             dict(zip(layout.goals, remaining, strict=True)), dict(zip(layout.goals, optimal, strict=True)), beta, prior
         )
-        belief = EqOneBelief(layout, beta, start=start, prior=prior)
+        belief = GoalBelief(layout, beta, start=start, prior=prior)
         assert belief.update(hand) == pytest.approx(expected, abs=1e-9)
         compared += 1
 
 
 def test_only_the_start_and_the_hand_matter():
-    straight, wandering = EqOneBelief(WALLED, start=HOME), EqOneBelief(WALLED)
+    straight, wandering = GoalBelief(WALLED, start=HOME), GoalBelief(WALLED)
     for point in (HOME, (0.3, 0.3), (1.0, 0.7), (0.1, 0.1), (0.45, 0.3)):
         last = wandering.update(point, time=1.0)
     assert straight.update((0.45, 0.3)) == last == wandering.belief
 
 
 def test_at_the_start_it_is_the_prior_exactly():
-    belief = EqOneBelief(WALLED, goals=COLUMNS.goals[:4])
+    belief = GoalBelief(WALLED, goals=COLUMNS.goals[:4])
     uniform = dict.fromkeys(COLUMNS.goals[:4], 0.25)
     assert belief.belief == uniform
     assert belief.update((0.33, 0.21)) == uniform
     prior = {"red-circle": 3, "blue-circle": 1, "green-circle": 0}
-    weighed = EqOneBelief(WALLED, goals=list(prior), prior=prior, start="home")
+    weighed = GoalBelief(WALLED, goals=list(prior), prior=prior, start="home")
     assert weighed.belief == {"red-circle": 0.75, "blue-circle": 0.25, "green-circle": 0.0}
     assert weighed.update(HOME) == weighed.belief
     assert weighed.update(WALLED.place("green-circle"))["green-circle"] == 0  # impossible stays impossible
@@ -79,7 +79,7 @@ def test_at_the_start_it_is_the_prior_exactly():
 
 def test_at_a_goal_it_is_sure():
     for goal in COLUMNS.goals:
-        belief = EqOneBelief(WALLED, start=HOME).update(WALLED.place(goal))
+        belief = GoalBelief(WALLED, start=HOME).update(WALLED.place(goal))
         assert max(belief, key=belief.__getitem__) == goal
 
 
@@ -87,7 +87,7 @@ def test_without_obstacles_straight_lines_count():
     start, hand = np.array(HOME), np.array((0.5, 0.2))
     far = np.hypot(*(COLUMNS.centres - hand).T) - np.hypot(*(COLUMNS.centres - start).T)
     weights = np.exp(-20 * far)
-    found = EqOneBelief(COLUMNS, start=start).update(hand)
+    found = GoalBelief(COLUMNS, start=start).update(hand)
     np.testing.assert_allclose(list(found.values()), weights / weights.sum(), atol=1e-12)
 
 
@@ -96,14 +96,14 @@ def test_a_hand_inside_a_grown_obstacle_is_at_the_nearest_free_point():
     points = rng.uniform((0, 0), (1.2, 0.8), (4000, 2))
     covered = points[~WALLED.paths.is_free(points)][:200]
     assert len(covered) == 200
-    at, beside = EqOneBelief(WALLED, start=HOME), EqOneBelief(WALLED, start=HOME)
+    at, beside = GoalBelief(WALLED, start=HOME), GoalBelief(WALLED, start=HOME)
     for point, free in zip(covered, WALLED.paths.nearest_free(covered), strict=True):
         assert not np.array_equal(point, free)
         found = at.update(point)
         assert found == beside.update(free)
         assert sum(found.values()) == pytest.approx(1)
-    inside = EqOneBelief(WALLED, start=covered[0])  # so is the start
-    assert inside.update((0.5, 0.1)) == EqOneBelief(WALLED, start=WALLED.paths.nearest_free(covered[:1])[0]).update(
+    inside = GoalBelief(WALLED, start=covered[0])  # so is the start
+    assert inside.update((0.5, 0.1)) == GoalBelief(WALLED, start=WALLED.paths.nearest_free(covered[:1])[0]).update(
         (0.5, 0.1)
     )
 
@@ -113,13 +113,13 @@ def test_objects_that_were_moved_count_where_they_are():
     moved = {"green-circle": (0.55, 0.43), "red-triangle": (0.21, 0.66)}
     objects = [TableObject(o.name, moved.get(o.name, o.at)) for o in WALLED.objects]
     pushed = TabletopLayout(objects, WALLED.obstacles)
-    there = EqOneBelief(pushed, goals=goals, start=HOME)
-    told = EqOneBelief(WALLED, goals=goals, positions=[moved[g] for g in goals], start=HOME)
+    there = GoalBelief(pushed, goals=goals, start=HOME)
+    told = GoalBelief(WALLED, goals=goals, positions=[moved[g] for g in goals], start=HOME)
     for point in ((0.5, 0.2), (0.3, 0.5), (0.33, 0.45)):
         assert told.update(point) == there.update(point)
-    assert told.belief != EqOneBelief(WALLED, goals=goals, start=HOME).update((0.33, 0.45))
-    same = EqOneBelief(WALLED, goals=goals, positions=[WALLED.place(g) for g in goals], start=HOME)
-    assert same.update((0.5, 0.2)) == EqOneBelief(WALLED, goals=goals, start=HOME).update((0.5, 0.2))
+    assert told.belief != GoalBelief(WALLED, goals=goals, start=HOME).update((0.33, 0.45))
+    same = GoalBelief(WALLED, goals=goals, positions=[WALLED.place(g) for g in goals], start=HOME)
+    assert same.update((0.5, 0.2)) == GoalBelief(WALLED, goals=goals, start=HOME).update((0.5, 0.2))
 
 
 def test_a_goal_behind_obstacles_counts_by_its_straight_line():
@@ -127,9 +127,9 @@ def test_a_goal_behind_obstacles_counts_by_its_straight_line():
     assert np.isinf(layout.paths.lengths([HOME])).tolist() == [[True, False]]
     free = layout.with_obstacles([])
     hand = (0.8, 0.12)  # whence the open one is in sight
-    assert EqOneBelief(layout, start=HOME).update(hand) == pytest.approx(EqOneBelief(free, start=HOME).update(hand))
+    assert GoalBelief(layout, start=HOME).update(hand) == pytest.approx(GoalBelief(free, start=HOME).update(hand))
     nowhere = layout.with_obstacles([VirtualObstacle((0.6, 0.4), 0.0, (3.0, 3.0))])  # no free point at all
-    assert EqOneBelief(nowhere, start=HOME).update(hand) == pytest.approx(EqOneBelief(free, start=HOME).update(hand))
+    assert GoalBelief(nowhere, start=HOME).update(hand) == pytest.approx(GoalBelief(free, start=HOME).update(hand))
 
 
 @settings(deadline=None, max_examples=60)
@@ -141,7 +141,7 @@ def test_a_goal_behind_obstacles_counts_by_its_straight_line():
 )
 def test_whatever_the_hand_does_it_is_a_distribution(start, hand, beta, closed):
     layout = WALLED.with_obstacles(boxed(WALLED.objects[1].at, 0.08)) if closed else WALLED
-    found = EqOneBelief(layout, beta, start=start).update(hand)
+    found = GoalBelief(layout, beta, start=start).update(hand)
     assert tuple(found) == layout.goals
     assert all(0 <= p <= 1 for p in found.values())
     assert sum(found.values()) == pytest.approx(1)
@@ -150,15 +150,15 @@ def test_whatever_the_hand_does_it_is_a_distribution(start, hand, beta, closed):
 def test_as_a_predictor_it_opens_a_stream_for_each_reach():
     goals = COLUMNS.goals[:3]
     context = Trajectory(np.zeros((0, 2)), candidates=goals, layout=WALLED, complete=False)
-    stream = EqOne(12.0).stream(context)
+    stream = BayesianIntent(12.0).stream(context)
     stream.update(HOME)
-    assert stream.update((0.5, 0.2), 0.3) == EqOneBelief(WALLED, 12.0, goals=goals, start=HOME).update((0.5, 0.2))
-    assert repr(EqOne()) == "EqOne(beta=20.0)"
+    assert stream.update((0.5, 0.2), 0.3) == GoalBelief(WALLED, 12.0, goals=goals, start=HOME).update((0.5, 0.2))
+    assert repr(BayesianIntent()) == "BayesianIntent(beta=20.0)"
 
 
 @pytest.mark.parametrize("point", [(math.nan, 0), (math.inf, 0), (1,), (1, 2, 3), "ab", None, 3.0, ("x", 1)])
 def test_what_is_no_point_is_rejected_and_changes_nothing(point):
-    belief = EqOneBelief(WALLED, start=HOME)
+    belief = GoalBelief(WALLED, start=HOME)
     before = belief.update((0.4, 0.2))
     with pytest.raises(LayoutError, match="finite point"):
         belief.update(point)
@@ -187,4 +187,4 @@ def test_what_is_no_point_is_rejected_and_changes_nothing(point):
 )
 def test_wrong_arguments_are_named(options, message):
     with pytest.raises(ValueError, match=message):
-        EqOneBelief(WALLED, **options)
+        GoalBelief(WALLED, **options)

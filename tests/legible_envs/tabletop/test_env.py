@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import itertools
 import json
 import math
 import os
@@ -35,9 +36,9 @@ from tests.legible_envs.tabletop.table_player import (
 )
 
 VARIANTS = [
-    {"layout": WALL, "obstacles": "soft", "crossing_cost": 1.0},
+    {"layout": WALL, "virtual_obstacles": "soft", "crossing_cost": 1.0},
     {"layout": WALL, "contact": "always", "max_speed": 0.5},
-    {"task": "tea", "contact": "never", "predictor": "eq1"},
+    {"task": "tea", "contact": "never", "predictor": "bayesian"},
     {"task": "bins", "max_obstacles": 0},
     {"layout": WALL, "partner": "robot", "contact": "always", "max_speed": 0.5},
     {"partner": {"max_speed": 0.5}, "threshold": 0.0, "time_cost": 0.0},
@@ -109,7 +110,7 @@ def test_replays_are_exact_in_a_new_process():
 
 
 def test_vectors_of_tables():
-    envs = gym.make_vec(NAME, num_envs=2, vectorization_mode="sync", predictor="eq1")
+    envs = gym.make_vec(NAME, num_envs=2, vectorization_mode="sync", predictor="bayesian")
     envs.reset(seed=0)
     envs.set_attr("layout", [WALL, TASK.layout])
     _, info = envs.reset()
@@ -127,6 +128,36 @@ def test_vectors_of_tables_where_one_has_a_belief_and_the_other_none(busy):
     assert info["holding"].tolist() == [FIRST[0] if i == busy else None for i in range(2)]
     for goal in FIRST:
         assert info["belief"]["_" + goal].tolist() == [i != busy for i in range(2)]
+
+
+@pytest.mark.parametrize("mode", ["sync", "async"])
+def test_vectors_stack_what_is_valid(mode):
+    envs = gym.make_vec(NAME, num_envs=2, vectorization_mode=mode, partner="robot")
+    _, info = envs.reset(seed=0)
+    try:
+        for _ in range(3):
+            assert info["goal_mask"].shape == (2, 8)
+            assert info["goal_mask"].dtype == np.bool_
+            for mask, names in zip(info["goal_mask"], info["goals"], strict=True):
+                assert {name for name, valid in zip(TASK.layout.goals, mask, strict=True) if valid} == set(names)
+            assert info["num_done"].tolist() == [0, 0]
+            assert envs.call("valid_goal_names") == tuple(info["goals"])
+            _, _, _, _, info = envs.step(envs.action_space.sample() * 0)
+    finally:
+        envs.close()
+
+
+def test_info_has_the_same_keys_and_shares_no_array():
+    env = make(partner="robot")
+    seen = [env.reset(seed=0)[1]] + [result[4] for result in play(env)]
+    assert all(info.keys() == seen[0].keys() for info in seen)
+    assert "done" not in seen[0]
+    for info in seen:
+        assert info["goals"] == tuple(sorted(info["goals"]))
+        assert set(info["goals"]) == set(np.array(TASK.layout.goals)[info["goal_mask"]])
+    assert len({id(info["goal_mask"]) for info in seen}) == len(seen)
+    assert not any(np.shares_memory(a["goal_mask"], b["goal_mask"]) for a, b in itertools.pairwise(seen))
+    assert not seen[-1]["goal_mask"].any()
 
 
 def test_partners_are_not_shared_among_environments():
@@ -147,7 +178,7 @@ def test_a_player_finishes_every_task(task, done):
     env = make(task=task)
     results = play(env)
     assert [result[2] for result in results] == [False] * (len(results) - 1) + [True]
-    assert results[-1][4]["done"] == done
+    assert results[-1][4]["num_done"] == done
     assert math.fsum(r[1] for r in results) == pytest.approx(done - 0.05 * len(results) / 30)
     game, layout = env.unwrapped, env.unwrapped.layout
     for name, at in game.task.configuration.items():
@@ -172,7 +203,7 @@ def test_the_task_says_what_is_valid_when():
     stages = TASK.graph.stages()
     order = (*FIRST[::-1], *SECOND)
     for number, name in enumerate(order):
-        assert info["done"] == number
+        assert info["num_done"] == number
         assert info["candidate_set"] == "game"
         assert set(info["goals"]) == {*(FIRST if number < 4 else SECOND)} - {*order[:number]}
         stage = stages[info["stage"]]
@@ -187,7 +218,7 @@ def test_nothing_is_valid_while_something_is_carried():
     env.reset()
     go_to(env, TASK.layout.place(FIRST[0]), near=0.02)
     assert env.unwrapped.holding == FIRST[0]
-    assert env.unwrapped.goals == ()
+    assert env.unwrapped.valid_goal_names() == ()
     assert env.unwrapped.carry_to.tolist() == list(TASK.configuration[FIRST[0]])
     before = env.unwrapped.hand
     _, _, _, _, info = env.step(np.array([0.1, 0.1]))
@@ -373,12 +404,12 @@ def test_hard_obstacles_stop_the_hand_at_its_width():
 
 
 def test_soft_obstacles_count_and_cost():
-    env = make(layout=WALL, obstacles="soft", crossing_cost=0.25, time_cost=0.0)
+    env = make(layout=WALL, virtual_obstacles="soft", crossing_cost=0.25, time_cost=0.0)
     env.reset(options={"start": (0.55, 0.15)})
     rewards = [env.step(np.array([0.0, y]))[1] for y in (0.5, 0.5, 0.5, 0.5, -0.5, -0.5, -0.5)]
     assert sum(rewards) == -0.5
     assert env.unwrapped.view().crossings == 2
-    assert env.unwrapped.view().obstacles_mode == "soft"
+    assert env.unwrapped.view().virtual_obstacles == "soft"
     env.reset(options={"start": (0.55, 0.15)})
     assert env.step(np.array([0.5, 0.0]))[4]["crossings"] == 0
 
@@ -388,7 +419,7 @@ def test_a_fast_hand_passes_no_thin_obstacle():
     env.reset(options={"start": (0.55, 0.1)})
     env.step(np.array([0.0, 1.0]))
     assert env.unwrapped.hand[1] < 0.2
-    soft = make(layout=WALL, max_speed=30.0, obstacles="soft")
+    soft = make(layout=WALL, max_speed=30.0, virtual_obstacles="soft")
     soft.reset(options={"start": (0.55, 0.1)})
     assert soft.step(np.array([0.0, 1.0]))[4]["crossings"] == 1
 

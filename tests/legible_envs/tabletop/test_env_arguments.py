@@ -99,10 +99,10 @@ BAD_OPTIONS = {
 
 
 @pytest.mark.parametrize("case", BAD_OPTIONS)
-@pytest.mark.parametrize("obstacles", ["hard", "soft"])
-def test_bad_options_are_named_and_change_nothing(case, obstacles):
+@pytest.mark.parametrize("virtual_obstacles", ["hard", "soft"])
+def test_bad_options_are_named_and_change_nothing(case, virtual_obstacles):
     options, message, rule = BAD_OPTIONS[case]
-    env, twin = make(obstacles=obstacles), make(obstacles=obstacles)
+    env, twin = make(virtual_obstacles=virtual_obstacles), make(virtual_obstacles=virtual_obstacles)
     for e in (env, twin):
         e.reset(seed=0)
         e.step(np.array([0.2, 0.3]))
@@ -147,7 +147,7 @@ def test_anything_is_a_layout_or_a_layout_error(value):
 
 
 BAD_ARGUMENTS = [
-    {"obstacles": "firm"},
+    {"virtual_obstacles": "firm"},
     {"contact": "push"},
     {"max_obstacles": -1},
     {"max_obstacles": 2.0},
@@ -162,7 +162,7 @@ BAD_ARGUMENTS = [
     {"partner": {"colour": 3}},
     {"partner": "nowhere:Robot"},
     {"partner": "builtins:object"},
-    {"partner": Grabber(), "predictor": "eq1"},
+    {"partner": Grabber(), "predictor": "bayesian"},
     {"partner": "robot", "task": "bins"},
     {"predictor": "nowhere:Predictor"},
     {"predictor": 3},

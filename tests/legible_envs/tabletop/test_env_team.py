@@ -12,7 +12,7 @@ import legible_envs  # noqa: F401
 from legible_envs.errors import LayoutError
 from legible_envs.rollouts import load_trajectories, save_trajectories
 from legible_envs.rollouts.recording import RecordReaches
-from legible_envs.tabletop.partner.belief import EqOneBelief
+from legible_envs.tabletop.partner.belief import GoalBelief
 from tests.legible_envs.tabletop.table_envs import APART, FIRST, SECOND, TASK, WALL, make
 from tests.legible_envs.tabletop.table_player import (
     Doubtful,
@@ -26,11 +26,11 @@ from tests.legible_envs.tabletop.table_player import (
 )
 
 
-def test_beliefs_are_equation_one_along_the_reach():
-    env = make(layout=WALL, predictor="eq1")
+def test_beliefs_are_bayesian_goal_inference_along_the_reach():
+    env = make(layout=WALL, predictor="bayesian")
     _, info = env.reset(seed=0)
     assert info["belief"] == pytest.approx(dict.fromkeys(FIRST, 0.25))
-    expected = EqOneBelief(WALL, start="home", goals=sorted(FIRST))
+    expected = GoalBelief(WALL, start="home", goals=sorted(FIRST))
     for _ in range(100):
         info = env.step(towards(env, next_point(env, FIRST[3])))[4]
         if info["holding"]:
@@ -46,7 +46,7 @@ def test_beliefs_are_equation_one_along_the_reach():
 def test_a_robot_and_a_person_build_together():
     alone, together = play(make(layout=APART)), play(make(layout=APART, partner="robot"))
     info = together[-1][4]
-    assert info["done"] == 8
+    assert info["num_done"] == 8
     assert len(together) < len(alone)
     assert math.fsum(r[1] for r in together) == pytest.approx(8 - 0.05 * len(together) / 30)
     assert info["completion_time"] == pytest.approx(len(together) / 30)
@@ -93,7 +93,7 @@ def test_who_takes_an_object_first_has_it():
     for _ in range(10):
         info = slow.step(np.zeros(2))[4]
     assert info["holding"] == FIRST[2]
-    assert FIRST[2] not in slow.unwrapped.goals
+    assert FIRST[2] not in slow.unwrapped.valid_goal_names()
     assert slow.unwrapped.view().robot_holding is None
 
 
@@ -106,7 +106,7 @@ def test_what_a_robot_holds_is_not_valid_for_the_person_until_it_is_dropped():
         status.append(env.unwrapped.view().status[1])
         assert (FIRST[1] in info["goals"]) == (status[-1] == "free")
     assert [s for s, before in zip(status, ["", *status], strict=False) if s != before] == ["free", "robot", "free"]
-    assert info["done"] == 0
+    assert info["num_done"] == 0
     dropped = env.unwrapped.positions[1]
     assert math.dist(dropped, TASK.layout.place(FIRST[1])) > 0.05
     for name in (*FIRST, *SECOND):
@@ -114,7 +114,7 @@ def test_what_a_robot_holds_is_not_valid_for_the_person_until_it_is_dropped():
     assert result[2]
 
 
-def test_second_things_wait_for_first_ones_in_the_gripper():
+def test_second_objects_wait_for_first_ones_in_the_gripper():
     env = make(partner=Grabber(FIRST[0], speed=0.3))
     env.reset(seed=0)
     for name in FIRST[1:]:
@@ -133,7 +133,7 @@ def test_a_predictor_that_fails_is_reported_once_and_the_episode_goes_on(predict
     assert len(caught) == 1
     assert all(result[4]["belief"] == {} for result in results)
     info = results[-1][4]
-    assert info["done"] == 8
+    assert info["num_done"] == 8
     assert info["completion_time"] is not None
     with pytest.warns(RuntimeWarning, match="Doubtful"):
         assert make(predictor=Doubtful()).reset()[1]["belief"] == {}
@@ -219,7 +219,7 @@ def test_reaches_of_many_episodes_are_kept(tmp_path):
         info = play(env, seed)[-1][4]
         counts.append(len(env.trajectories()))
     assert counts[0] == 0 < counts[1] < counts[2] < 16  # the robot takes some
-    assert info["done"] == 8
+    assert info["num_done"] == 8
     with pytest.raises(LayoutError):
         env.reset(options={"layout": 3})
     assert len(env.trajectories()) == counts[2]

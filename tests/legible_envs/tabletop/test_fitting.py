@@ -96,7 +96,7 @@ def test_corners_of_obstacles_tell_their_price_and_nothing_of_bows() -> None:
     layout = TabletopLayout(task.layout.objects, walls, task.layout.table)
     layout.validate()
     calm = ReachModel(Person(corner_cost=0.35, bow_trial=0.0), bow_spread=0.0, bow_target=0.0, duration_spread=0.02)
-    reaches = simulate_participants(task, layout, 60, np.random.default_rng(0), model=calm)
+    reaches = simulate_participants(layout, 60, np.random.default_rng(0), task=task, population=calm)
     found = fit_reaches(reaches)
     assert found.median.corner_cost == pytest.approx(0.35, abs=0.06)
     assert found.median.bow == pytest.approx(-0.105, abs=0.02)

@@ -108,12 +108,12 @@ READ = [
 
 def test_when_the_robot_was_sure_and_whether_rightly():
     metrics = measured(READ, 9.5)
-    assert [(r.reach, r.taken, r.duration, r.decision_time, r.predicted) for r in metrics.readings] == [
+    assert [(r.reach, r.taken, r.duration, r.decision_time, r.predicted) for r in metrics.predictions] == [
         (1, "cup", 1.0, 0.5, "cup"),
         (2, "tea", 1.0, 0.0, "milk"),
         (4, "milk", 1.0, 1.0, None),
     ]
-    assert [(r.fraction, r.correct) for r in metrics.readings] == [(0.5, True), (0.0, False), (1.0, False)]
+    assert [(r.fraction, r.correct) for r in metrics.predictions] == [(0.5, True), (0.0, False), (1.0, False)]
     found = metrics.summary()
     assert found["conflicts"] == metrics.conflicts == 1
     assert found["reaches"] == 3
@@ -123,8 +123,8 @@ def test_when_the_robot_was_sure_and_whether_rightly():
 
 
 def test_a_reach_that_takes_no_time_was_read_at_its_end():
-    (reading,) = measured([Tick(1.0, reach=1, taken="cup", predicted="cup")]).readings
-    assert (reading.duration, reading.fraction, reading.predicted) == (0.0, 1.0, None)
+    (prediction,) = measured([Tick(1.0, reach=1, taken="cup", predicted="cup")]).predictions
+    assert (prediction.duration, prediction.fraction, prediction.predicted) == (0.0, 1.0, None)
 
 
 def test_waiting_is_no_reach_and_without_a_choice_there_is_nothing_to_read():
@@ -138,7 +138,7 @@ def test_waiting_is_no_reach_and_without_a_choice_there_is_nothing_to_read():
             Tick(7.0, reach=2, choices=0, taken="tea"),
         ]
     )
-    assert [(r.duration, r.decision_time, r.choices) for r in metrics.readings] == [(2.0, 1.0, 2), (1.0, 0.0, 1)]
+    assert [(r.duration, r.decision_time, r.choices) for r in metrics.predictions] == [(2.0, 1.0, 2), (1.0, 0.0, 1)]
     found = metrics.summary()
     assert (found["reaches"], found["decision_time"], found["decision_fraction"]) == (2, 1.0, 0.5)
 

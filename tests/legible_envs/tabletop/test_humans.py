@@ -1,4 +1,4 @@
-"""People who reach over a table: their ways, their times, their tasks, and what Eq. 1 makes of them."""
+"""Simulated participants who reach over a table: paths, times, tasks, and what Eq. 1 predicts of them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from legible_envs.tabletop.humans import (
     simulate_reach,
     simulate_task,
 )
-from legible_envs.tabletop.partner.belief import EqOneBelief
+from legible_envs.tabletop.partner.belief import GoalBelief
 from predictors import (
     BayesianGoalPredictor,
     ShortestDistance,
@@ -54,12 +54,12 @@ def random_tables(count: int, seed: int = 0, obstacles: int = 4) -> list[Tableto
     """Valid tables with a few objects and obstacles anywhere."""
     rng, found = np.random.default_rng(seed), []
     while len(found) < count:
-        things = [TableObject(name, (rng.uniform(0.1, 0.8), rng.uniform(0.2, 0.7))) for name in ("a", "b", "c", "d")]
+        objects = [TableObject(name, (rng.uniform(0.1, 0.8), rng.uniform(0.2, 0.7))) for name in ("a", "b", "c", "d")]
         walls = [
             VirtualObstacle((rng.uniform(0.1, 1.1), rng.uniform(0.1, 0.7)), rng.uniform(0, np.pi))
             for _ in range(obstacles)
         ]
-        layout = TabletopLayout(things, walls)
+        layout = TabletopLayout(objects, walls)
         if layout.is_valid():
             found.append(layout)
     return found
@@ -80,7 +80,9 @@ def test_the_calm_person_is_minimum_jerk() -> None:
     ends = np.array([HOME, COLUMNS.layout.place("red-circle")])
     assert states == pytest.approx(ends[0] + progress[:, None] * (ends[1] - ends[0]), abs=1e-12)
     assert np.diff(times) == pytest.approx(0.02)
-    skewed = simulate_reach(COLUMNS.layout, "home", "red-circle", replace(CALM, skew=2.0), np.random.default_rng(0), 50)
+    skewed = simulate_reach(
+        COLUMNS.layout, "home", "red-circle", replace(CALM, skew=2.0), np.random.default_rng(0), rate=50
+    )
     early = 1 - (1 - share) ** 2
     progress = 10 * early**3 - 15 * early**4 + 6 * early**5
     assert skewed[1] == pytest.approx(ends[0] + progress[:, None] * (ends[1] - ends[0]), abs=1e-12)
@@ -97,11 +99,11 @@ def test_durations_follow_fitts_law_and_corners() -> None:
     times, _ = simulate_reach(layout, "home", "cup", person, np.random.default_rng(0), rate=1000)
     far = layout.paths.lengths([HOME])[0, 0]
     assert times[-1] == pytest.approx(0.1 + 0.2 * np.log2(far / 0.045 + 1) + 2 * 0.3, abs=1e-3)
-    kettle = TabletopTask.named("tea").layout  # wide things are reached sooner
+    kettle = TabletopTask.named("tea").layout  # wide objects are reached sooner
     assert person.duration(0.5, 0.14) < person.duration(0.5, 0.045)
-    slow = simulate_reach(kettle, "home", "kettle", person, np.random.default_rng(0), 1000)[0][-1]
-    way = kettle.paths.lengths([HOME])[0, kettle.index("kettle")]
-    assert slow == pytest.approx(0.1 + 0.2 * np.log2(way / 0.14 + 1), abs=1e-3)
+    slow = simulate_reach(kettle, "home", "kettle", person, np.random.default_rng(0), rate=1000)[0][-1]
+    length = kettle.paths.lengths([HOME])[0, kettle.index("kettle")]
+    assert slow == pytest.approx(0.1 + 0.2 * np.log2(length / 0.14 + 1), abs=1e-3)
 
 
 def test_bows_lean_where_the_person_leans_and_by_how_much() -> None:
@@ -220,12 +222,12 @@ def test_points_and_starts_in_the_margin_are_places_too() -> None:
             simulate_reach(*bad, CALM, rng)
     for rate in (0, -1.0, np.nan, np.inf, "fast", True):
         with pytest.raises(ValueError, match="rate"):
-            simulate_reach(layout, "home", "cup", CALM, rng, rate)
+            simulate_reach(layout, "home", "cup", CALM, rng, rate=rate)
     closed = [
         VirtualObstacle((0.6 + dx, 0.5 + dy), angle)
         for dx, dy, angle in ((0, 0.12, 0), (0, -0.12, 0), (0.12, 0, np.pi / 2), (-0.12, 0, np.pi / 2))
     ]
-    with pytest.raises(LayoutError, match="no way"):
+    with pytest.raises(LayoutError, match="no path"):
         simulate_reach(layout.with_obstacles(closed), "home", "cup", CALM, rng)
 
 
@@ -284,7 +286,7 @@ def test_a_task_is_done_in_a_valid_order(name: str) -> None:
     stages = {(stage.start, frozenset(stage.goals)) for stage in task.graph.stages()}
     rng = np.random.default_rng(0)
     for _ in range(5):
-        reaches = simulate_task(task, task.layout, sample_person(rng), rng, participant="p", layout_name="sorted")
+        reaches = simulate_task(task.layout, sample_person(rng), rng, task=task, participant="p", layout_name="sorted")
         assert len(reaches) == task.graph.length
         clock = -1.0
         for reach in reaches:
@@ -303,30 +305,49 @@ def test_a_task_is_done_in_a_valid_order(name: str) -> None:
 
 def test_orders_are_uniformly_random_and_seeds_repeat(tmp_path: object) -> None:
     tea = TabletopTask.named("tea")
-    reaches = simulate_participants(tea, tea.layout, 150, np.random.default_rng(3), executions=2)
+    reaches = simulate_participants(tea.layout, 150, np.random.default_rng(3), task=tea, executions=2)
     orders = [tuple(r.goal for r in reaches[k : k + 5]) for k in range(0, len(reaches), 5)]
     counts = np.unique(orders, axis=0, return_counts=True)[1]
     assert len(counts) == 12
     assert ((counts - 25) ** 2 / 25).sum() < 31.3  # chi square with 11 degrees of freedom, p = .001
     assert len({r.participant for r in reaches}) == 150
-    again = simulate_participants(tea, tea.layout, 150, np.random.default_rng(3), executions=2)
+    again = simulate_participants(tea.layout, 150, np.random.default_rng(3), task=tea, executions=2)
     assert again == reaches
     path = save_trajectories(f"{tmp_path}/reaches.npz", reaches[:20])
     assert load_trajectories(path) == reaches[:20]
     with pytest.raises(ValueError, match="executions"):
-        simulate_participants(tea, tea.layout, 1, np.random.default_rng(0), executions=-1)
+        simulate_participants(tea.layout, 1, np.random.default_rng(0), executions=-1)
     with pytest.raises(LayoutError, match="lacks"):
-        simulate_task(tea, COLUMNS.layout, Person(), np.random.default_rng(0))
-    assert simulate_participants(tea, tea.layout, 0, np.random.default_rng(0)) == []
+        simulate_task(COLUMNS.layout, Person(), np.random.default_rng(0), task=tea)
+    assert simulate_participants(tea.layout, 0, np.random.default_rng(0)) == []
+
+
+@pytest.mark.parametrize("name", ["columns", "tea", "bins"])
+def test_the_task_is_the_packaged_one_that_has_the_objects(name: str) -> None:
+    task = TabletopTask.named(name)
+    layout = TabletopLayout.from_json(task.layout.to_json())
+    assert TabletopTask.for_layout(layout) is task
+    people = (simulate_participants(layout, 2, np.random.default_rng(0), task=given) for given in (None, task))
+    assert next(people) == next(people)
+    one = (simulate_task(layout, Person(), np.random.default_rng(0), task=given) for given in (None, task))
+    assert next(one) == next(one)
+
+
+def test_without_a_packaged_task_one_must_be_named() -> None:
+    layout, rng = detour(), np.random.default_rng(0)
+    with pytest.raises(LayoutError, match=r"no task of the package \(bins, columns, tea\) has the objects \['cup'\]"):
+        simulate_participants(layout, 1, rng)
+    with pytest.raises(LayoutError, match="name the task"):
+        simulate_task(layout, Person(), rng)
 
 
 def test_a_workspace_has_people() -> None:
     workspace = TabletopWorkspace("tea")
     genome = workspace.sample(1, np.random.default_rng(0))[0]
     model = ReachModel(Person(crossing_rate=0.5))
-    reaches = workspace.simulate(genome, 3, np.random.default_rng(1), model=model, condition="random")
+    reaches = workspace.simulate(genome, 3, np.random.default_rng(1), population=model, condition="random")
     layout = workspace.decode(genome)
-    again = simulate_participants(workspace.task, layout, 3, np.random.default_rng(1), model=model, condition="random")
+    again = simulate_participants(layout, 3, np.random.default_rng(1), population=model, condition="random")
     assert reaches == again
     assert reaches[0].layout == layout
 
@@ -339,14 +360,14 @@ def test_the_first_sample_gives_nothing_away() -> None:
     reaches = [
         reach
         for number, layout in enumerate([COLUMNS.layout, with_walls()])
-        for reach in simulate_participants(COLUMNS, layout, 60, np.random.default_rng(number))
+        for reach in simulate_participants(layout, 60, np.random.default_rng(number))
     ]
     prior = np.array([1 / len(reach.candidates) for reach in reaches])
     first = [reach.first(1) for reach in reaches]
     assert StraightLineBayesian().fit(reaches).score(first) == pytest.approx(prior.mean())
     right = []
     for reach in reaches:
-        belief = EqOneBelief(reach.layout, start=reach.start, goals=reach.candidates)  # type: ignore[arg-type]
+        belief = GoalBelief(reach.layout, start=reach.start, goals=reach.candidates)  # type: ignore[arg-type]
         told = belief.update(reach.states[0])
         right.append(max(told, key=lambda goal: told[goal]) == reach.goal)
     assert np.mean(right) == pytest.approx(prior.mean(), abs=4 * np.sqrt((prior * (1 - prior)).sum()) / len(prior))
@@ -435,10 +456,10 @@ def test_plain_python_gives_the_same_reaches() -> None:
         "from legible_envs.tabletop import *\n"
         "from legible_envs.tabletop.humans import *\n"
         "layout = TabletopLayout([TableObject('cup', (0.6, 0.5))], [VirtualObstacle((0.62, 0.3))])\n"
-        "times, states = simulate_reach(layout, 'home', 'cup', Person(), np.random.default_rng(0), 10)\n"
+        "times, states = simulate_reach(layout, 'home', 'cup', Person(), np.random.default_rng(0), rate=10)\n"
         "print(times[-1], *states.ravel())"
     )
-    times, states = simulate_reach(detour(), "home", "cup", Person(), np.random.default_rng(0), 10)
+    times, states = simulate_reach(detour(), "home", "cup", Person(), np.random.default_rng(0), rate=10)
     expected = [times[-1], *states.ravel()]
     assert [float(x) for x in printed(code, compiled=False).split()] == pytest.approx(expected, abs=1e-12)
     assert len(expected) > 15
@@ -451,7 +472,7 @@ def test_people_can_be_learned_and_plain_minimum_jerk_is_only_straight() -> None
     plain = ReachModel(replace(Person(), skew=1.0, skew_trial=0.0, bow=0.0, bow_trial=0.0, aim=0.0), 0.0, 0.0, 0.0)
     learned_gains = []
     for model in (ReachModel(), plain):
-        reaches = workspace.simulate(genome, 40, np.random.default_rng(0), model=model)
+        reaches = workspace.simulate(genome, 40, np.random.default_rng(0), population=model)
         reaches = [reach for reach in reaches if reach.start == "assembly" and len(reach.candidates) > 1]
         train = [reach for reach in reaches if int(reach.participant.partition("/")[2]) < 25]
         test = reaches[len(train) :]
@@ -472,7 +493,7 @@ def test_people_are_read_better_on_optimised_tables_as_long_as_they_keep_off_obs
 
     def accuracy(condition: str, crossing_rate: float = 0.0) -> float:
         model = ReachModel(Person(crossing_rate=crossing_rate))
-        people = simulate_participants(COLUMNS, layouts[condition], 30, np.random.default_rng(0), model=model)
+        people = simulate_participants(layouts[condition], 30, np.random.default_rng(0), population=model)
         return StraightLineBayesian().fit(people).score(people)
 
     assert accuracy("baseline") + 0.05 < accuracy("placement") < accuracy("both") - 0.02

@@ -57,11 +57,11 @@ def test_a_hand_stays_free_and_goes_no_further_than_told(rows, start, moves):
         to_x, to_y, was_stopped = slide(paths.boxes, SIZE, x, y, dx, dy)
         assert paths.is_free([(to_x, to_y)])[0]
         assert math.dist((x, y), (to_x, to_y)) <= math.hypot(dx, dy) + 1e-8
-        way = LineString([(x, y), (x + dx, y + dy)])
-        is_clear = not any(way.intersects(box) for box in polygons(paths.boxes, -1e-9))
+        line = LineString([(x, y), (x + dx, y + dy)])
+        is_clear = not any(line.intersects(box) for box in polygons(paths.boxes, -1e-9))
         if is_clear and 0 <= x + dx <= 1.2 and 0 <= y + dy <= 0.8:
             assert (to_x, to_y, was_stopped) == (x + dx, y + dy, False)
-        if any(way.intersects(box) for box in solid):
+        if any(line.intersects(box) for box in solid):
             assert was_stopped
         x, y = to_x, to_y
 
@@ -109,11 +109,11 @@ def test_a_hand_can_follow_every_shortest_path():
         rows = [(*rng.uniform((0.1, 0.15), (0.9, 0.7)), rng.uniform(0, 3), 0.3, 0.01) for _ in range(4)]
         goals = rng.uniform((0.1, 0.2), (0.8, 0.7), (5, 2))
         paths = ShortestPaths(goals, rows, HAND, SIZE)
-        for goal, way in zip(goals, paths.polylines((0.6, 0.05)), strict=True):
-            if way is None or len(way) < 3:
+        for goal, path in zip(goals, paths.polylines((0.6, 0.05)), strict=True):
+            if path is None or len(path) < 3:
                 continue
-            at = way[0]
-            for corner in way[1:]:
+            at = path[0]
+            for corner in path[1:]:
                 for _ in range(200):
                     step = corner - at
                     if np.hypot(*step) < 1e-7:
@@ -127,10 +127,10 @@ def test_a_hand_can_follow_every_shortest_path():
 @given(st.lists(OBSTACLE, max_size=4), *[st.floats(-0.1, 1.2)] * 4)
 def test_crossings_are_those_of_geometry(rows, x0, y0, x1, y1):
     boxes = ShortestPaths(np.zeros((0, 2)), rows, 0.0, SIZE).boxes
-    way, start = LineString([(x0, y0), (x1, y1)]), Point(x0, y0)
+    line, start = LineString([(x0, y0), (x1, y1)]), Point(x0, y0)
     pairs = list(zip(polygons(boxes, 1e-8), polygons(boxes, -1e-8), strict=True))
-    least = sum(way.intersects(inner) and not start.intersects(outer) for inner, outer in pairs)
-    most = sum(way.intersects(outer) and not start.intersects(inner) for inner, outer in pairs)
+    least = sum(line.intersects(inner) and not start.intersects(outer) for inner, outer in pairs)
+    most = sum(line.intersects(outer) and not start.intersects(inner) for inner, outer in pairs)
     assert least <= count_entered(boxes, x0, y0, x1, y1) <= most
 
 
@@ -236,7 +236,7 @@ def test_taking_and_putting():
     physics.take(0)
     push(physics, (0.42, 0.4), (0.2, 0.0), 20)
     assert physics.positions[0].tolist() == [0.5, 0.4]
-    physics.put(0, (0.71, 0.42), 0.3, is_fixed=True)  # on top of the other, which gives way
+    physics.put(0, (0.71, 0.42), 0.3, is_fixed=True)  # on top of the other, which is pushed aside
     assert not physics.is_resting
     for _ in range(60):
         physics.advance((0.1, 0.1), (0.0, 0.0), False)

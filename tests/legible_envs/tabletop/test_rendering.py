@@ -1,4 +1,4 @@
-"""Drawings of tables: shapes, the same pixels every time, what must be told apart, and where doubt comes from."""
+"""Drawings of tables: shapes, the same pixels every time, what must be told apart, and what ambiguity is."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from legible_envs.legibility import posterior
 from legible_envs.tabletop import TableObject, TabletopLayout, TabletopTask, VirtualObstacle
 from legible_envs.tabletop.game.view import TableView
 from legible_envs.tabletop.rendering import (
-    draw_boards,
     draw_configuration,
+    draw_panels,
     draw_scene,
     draw_table,
     scene_shape,
 )
-from legible_envs.tabletop.rendering.boards import stage_of
-from legible_envs.tabletop.rendering.doubt import along, doubtful_reaches
+from legible_envs.tabletop.rendering.ambiguity import ambiguous_reaches, points_along
 from legible_envs.tabletop.rendering.frame import Frame
 from legible_envs.tabletop.rendering.glyphs import GLYPHS, initial
 from legible_envs.tabletop.rendering.palette import NAMED, TABLE, hex_of, ink_on
+from legible_envs.tabletop.rendering.panels import stage_of
 
 TASK = TabletopTask.named("columns")
 TABLES = TASK.layout
@@ -176,12 +176,12 @@ def test_paths_labels_and_titles() -> None:
         draw_table(WALLED, labels={"red-square": "?"})
 
 
-# -- doubt -------------------------------------------------------------------------------------------------------------
+# -- ambiguity ---------------------------------------------------------------------------------------------------------
 
 
-def test_doubt_is_what_eq_1_leaves_to_wrong_goals() -> None:
+def test_ambiguity_is_the_probability_that_eq_1_leaves_to_wrong_goals() -> None:
     """Against the definition, stage by stage, with straight lines where nothing is in the way."""
-    found = {(r.start, r.goal): r for r in doubtful_reaches(TABLES, TASK, pieces=7)}
+    found = {(r.start, r.goal): r for r in ambiguous_reaches(TABLES, TASK, pieces=7)}
     reach = found["assembly", "green-circle"]
     start, end = np.array(TABLES.place("assembly")), np.array(TABLES.place("green-circle"))
     np.testing.assert_allclose(reach.points, start + np.linspace(0, 1, 8)[:, None] * (end - start), atol=1e-12)
@@ -192,31 +192,31 @@ def test_doubt_is_what_eq_1_leaves_to_wrong_goals() -> None:
         weight += stage.weight
         for k in range(7):
             at = start + (k + 0.5) / 7 * (end - start)
-            ways = {g: float(np.hypot(*(at - TABLES.place(g)))) for g in stage.goals}
+            rest = {g: float(np.hypot(*(at - TABLES.place(g)))) for g in stage.goals}
             whole = {g: float(np.hypot(*(start - TABLES.place(g)))) for g in stage.goals}
-            total[k] += stage.weight * (1 - posterior(ways, whole, 20.0)["green-circle"])
-    np.testing.assert_allclose(reach.doubt, total / weight, atol=1e-12)
+            total[k] += stage.weight * (1 - posterior(rest, whole, 20.0)["green-circle"])
+    np.testing.assert_allclose(reach.ambiguity, total / weight, atol=1e-12)
     assert reach.weight == pytest.approx(weight)
 
 
-def test_doubt_follows_shortest_paths() -> None:
-    for reach in doubtful_reaches(WALLED, TASK, pieces=200):
+def test_ambiguity_follows_shortest_paths() -> None:
+    for reach in ambiguous_reaches(WALLED, TASK, pieces=200):
         length = np.hypot(*np.diff(reach.points, axis=0).T).sum()
         whole = WALLED.paths.lengths([WALLED.place(reach.start)])[0, WALLED.index(reach.goal)]
         assert length == pytest.approx(whole, rel=2e-3)
-        assert ((reach.doubt >= -1e-12) & (reach.doubt <= 1)).all()
+        assert ((reach.ambiguity >= -1e-12) & (reach.ambiguity <= 1)).all()
 
 
-def test_points_lie_at_equal_distances_along_a_bent_way() -> None:
-    points = along(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 3.0]]), 8)
+def test_points_lie_at_equal_distances_along_a_bent_path() -> None:
+    points = points_along(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 3.0]]), 8)
     np.testing.assert_allclose(points[[0, 1, 2, 3, 8]], [[0, 0], [0.5, 0], [1, 0], [1, 0.5], [1, 3]])
 
 
-def test_doubt_needs_a_task_and_adds_a_scale() -> None:
+def test_ambiguity_needs_a_task_and_adds_a_scale() -> None:
     with pytest.raises(ValueError, match="task="):
-        draw_table(TABLES, doubt=True)
-    with_scale = draw_table(TABLES, task=TASK, doubt=True, width=300)
-    without = draw_table(TABLES, task=TASK, doubt=True, width=300, scale=False)
+        draw_table(TABLES, ambiguity=True)
+    with_scale = draw_table(TABLES, task=TASK, ambiguity=True, width=300)
+    without = draw_table(TABLES, task=TASK, ambiguity=True, width=300, scale=False)
     np.testing.assert_array_equal(with_scale[: len(without)], without)
     assert len(with_scale) > len(without)
     assert (without != draw_table(TABLES, task=TASK, width=300)).any()
@@ -309,21 +309,21 @@ def test_views_that_do_not_fit_together_are_refused(change: dict[str, object], m
         draw_scene(at(**change))
 
 
-# -- boards ------------------------------------------------------------------------------------------------------------
+# -- panels ------------------------------------------------------------------------------------------------------------
 
 
-def test_boards_show_every_layout_and_the_configuration() -> None:
-    one = draw_boards({"Baseline": TABLES}, TASK, width=200, doubt=False, captions={"Baseline": "legibility 7"})
-    two = draw_boards({"Baseline": TABLES, "Walled": WALLED}, TASK, width=200, doubt=False)
-    assert two.shape[0] > one.shape[0], "two boards, the configuration and what marks mean make two rows of three"
+def test_panels_show_every_layout_and_the_configuration() -> None:
+    one = draw_panels({"Baseline": TABLES}, TASK, width=200, ambiguity=False, captions={"Baseline": "legibility 7"})
+    two = draw_panels({"Baseline": TABLES, "Walled": WALLED}, TASK, width=200, ambiguity=False)
+    assert two.shape[0] > one.shape[0], "two panels, the configuration and what marks mean make two rows of three"
     with pytest.raises(ValueError, match="captions"):
-        draw_boards({"Baseline": TABLES}, TASK, captions={"Base": ""})
+        draw_panels({"Baseline": TABLES}, TASK, captions={"Base": ""})
     with pytest.raises(ValueError, match="at least one"):
-        draw_boards({}, TASK)
+        draw_panels({}, TASK)
 
 
 def test_captions_are_the_scores_of_the_layouts() -> None:
-    from legible_envs.tabletop.rendering.boards import _caption
+    from legible_envs.tabletop.rendering.panels import _caption
     from legible_envs.tabletop.scoring.scorer import TabletopScorer
 
     scores = TabletopScorer(TASK).layout(WALLED)

@@ -207,7 +207,7 @@ def test_a_closed_box_round_a_cube():
     assert math.isfinite(found[1, 0])
     assert found[1, 1] == math.inf
     assert layout.paths.polylines(HOME)[0] is None
-    with pytest.raises(LayoutError, match="no way from") as caught:
+    with pytest.raises(LayoutError, match="no path from") as caught:
         layout.paths.polyline(HOME, "cup0")
     assert caught.value.rule == "reachable"
     with pytest.raises(LayoutError, match=r"cup0 at .* cannot be reached from 'home'") as caught:

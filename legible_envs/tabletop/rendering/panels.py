@@ -1,4 +1,4 @@
-"""The figure of the paper: what is built, and the layouts that searches found for it, side by side."""
+"""The figure of the paper: the layouts that searches found for a task, and its configuration, side by side."""
 
 from __future__ import annotations
 
@@ -16,68 +16,68 @@ from legible_envs.tabletop.rendering.frame import Frame, check_width
 from legible_envs.tabletop.rendering.objects import outline, paste_object
 from legible_envs.tabletop.rendering.palette import TABLE
 from legible_envs.tabletop.rendering.surface import surface_of
-from legible_envs.tabletop.rendering.table import draw_doubt_scale, draw_table
+from legible_envs.tabletop.rendering.table import draw_ambiguity_scale, draw_table
 from legible_envs.tabletop.task import TabletopTask
 from legible_envs.tasks import TaskGraph
 
 if TYPE_CHECKING:
     from legible_envs.tabletop.scoring.scorer import TabletopScorer
 
-__all__ = ["draw_boards", "draw_configuration", "stage_of"]
+__all__ = ["draw_configuration", "draw_panels", "stage_of"]
 
 
-def draw_boards(
-    boards: Mapping[str, TabletopLayout],
+def draw_panels(
+    panels: Mapping[str, TabletopLayout],
     task: TabletopTask,
     *,
     captions: Mapping[str, str] | None = None,
     scorer: TabletopScorer | None = None,
     width: int = 560,
     columns: int = 3,
-    doubt: bool = True,
+    ambiguity: bool = True,
     grown: bool = False,
     beta: float = 20.0,
 ) -> Image:
-    """Draw layouts of one task side by side, then the configuration to be built and what the marks mean.
+    """Draw layouts of one task side by side, then the configuration to be built and a legend.
 
     With the baseline and the best layouts of the three conditions this is the figure of Tung et al. (HRI 2024).
 
     Args:
-        boards: Layouts by title, such as ``{"Baseline": …, "Placement Optimized": …}``.
-        task: What is built on them.
-        captions: Lines beneath each board, by title. None writes legibility, mean detour and length of the way.
-        scorer: What those come from; one with the field's defaults if None.
-        width: Pixels of a board.
-        columns: Boards in a row.
-        doubt: Whether to draw shortest reaches, coloured by how unsure an observer is of their goal.
+        panels: Layouts by title, such as ``{"Baseline": …, "Placement Optimized": …}``.
+        task: The task of all layouts.
+        captions: Lines beneath each panel, by title. None writes legibility, mean detour and length of the path.
+        scorer: Scores the layouts for the captions; one with the field's defaults if None.
+        width: Pixels of a panel.
+        columns: Panels in a row.
+        ambiguity: Whether to draw shortest reaches, coloured by how unsure an observer is of their goal.
         grown: Whether to show where an obstacle keeps the centre of the hand away.
-        beta: Rationality per metre, of ``doubt``.
+        beta: Rationality per metre, of ``ambiguity``.
 
     Returns:
         ``(h, w, 3)`` uint8.
 
     Raises:
-        ValueError: No board, a width out of range, or captions for other boards.
-        LayoutError: A board lacks an object of the task.
+        ValueError: No panel, a width out of range, or captions for other panels.
+        LayoutError: A panel lacks an object of the task.
     """
     check_width(width)
-    if captions is not None and set(captions) != set(boards):
-        raise ValueError(f"expected captions for the boards {list(boards)}, got some for {list(captions)}")
-    if not boards:
-        raise ValueError("expected at least one board")
-    texts = {title: captions[title] if captions else _caption(boards[title], task, scorer) for title in boards}
+    if captions is not None and set(captions) != set(panels):
+        raise ValueError(f"expected captions for the panels {list(panels)}, got some for {list(captions)}")
+    if not panels:
+        raise ValueError("expected at least one panel")
+    texts = {title: captions[title] if captions else _caption(panels[title], task, scorer) for title in panels}
     text = max(13, round(width * 0.047))
     images = [
-        draw_table(layout, task=task, width=width, doubt=doubt, beta=beta, grown=grown, scale=False)
-        for layout in boards.values()
+        draw_table(layout, task=task, width=width, ambiguity=ambiguity, beta=beta, grown=grown, scale=False)
+        for layout in panels.values()
     ]
-    titles, below = [*boards], [texts[title] for title in boards]
+    titles, below = [*panels], [texts[title] for title in panels]
     if task.configuration:
         images.append(draw_configuration(task, width=width))
         titles.append("Desired configuration")
         below.append(_order_words(task))
-    has_obstacles = any(layout.obstacles for layout in boards.values())
-    images.append(_legend(task, width, round(0.8 * text), doubt, has_obstacles))
+    has_obstacles = any(layout.obstacles for layout in panels.values())
+    images.append(_legend(task, width, round(0.8 * text), ambiguity, has_obstacles))
     return draw_side_by_side(
         images, [*titles, ""], [*below, ""], columns=min(columns, len(images)), gap=text, text=text
     )
@@ -116,7 +116,7 @@ def stage_of(graph: TaskGraph) -> dict[str, int]:
 
 
 def draw_configuration(task: TabletopTask, *, width: int = 560) -> Image:
-    """Draw what is to be built, every object in its place, with the stage in which it is fetched beside it.
+    """Draw the configuration of a task: every object in its place, beside it the stage in which it is fetched.
 
     Returns:
         ``(h, width, 3)`` uint8, as high as a table.
@@ -125,15 +125,15 @@ def draw_configuration(task: TabletopTask, *, width: int = 560) -> Image:
         ValueError: The task has no configuration.
     """
     if not task.configuration:
-        raise ValueError(f"task {task.name!r} has no configuration: nothing of it is built")
+        raise ValueError(f"task {task.name!r} has no configuration to draw")
     built = TabletopLayout(
         [replace(o, at=task.configuration.get(o.name, o.at)) for o in task.layout.objects], (), task.layout.table
     )
     frame = Frame.of(built.table, width)
     image = surface_of(built, None, frame.width).copy()
     stages = stage_of(task.graph)
-    for thing in built.objects:
-        paste_object(image, frame, thing, *thing.at, faded=thing.name not in task.configuration)
+    for obj in built.objects:
+        paste_object(image, frame, obj, *obj.at, faded=obj.name not in task.configuration)
     for name in task.configuration:
         if len(set(stages.values())) > 1 and name in stages:
             _badge(image, frame, built, name, stages[name])
@@ -142,11 +142,11 @@ def draw_configuration(task: TabletopTask, *, width: int = 560) -> Image:
 
 def _badge(image: Image, frame: Frame, layout: TabletopLayout, name: str, stage: int) -> None:
     """The number of a stage at the upper left of an object."""
-    thing = layout.objects[layout.index(name)]
+    obj = layout.objects[layout.index(name)]
     size = max(10, round(0.042 * frame.scale))
-    column, row = frame.pixel(*thing.at)
+    column, row = frame.pixel(*obj.at)
     words = text_sprite(str(stage), size, TABLE["ink"])
-    at = (row - len(words.colour) / 2, column - thing.size[0] / 2 * frame.scale - words.colour.shape[1] - 0.3 * size)
+    at = (row - len(words.colour) / 2, column - obj.size[0] / 2 * frame.scale - words.colour.shape[1] - 0.3 * size)
     paste(image, words, round(at[0]), round(at[1]))
 
 
@@ -157,25 +157,25 @@ def _order_words(task: TabletopTask) -> str:
     return f"all of {' before '.join(str(i) for i in range(1, stages + 1))}, in any order within"
 
 
-def _legend(task: TabletopTask, width: int, size: int, doubt: bool, obstacles: bool) -> Image:
-    """What the marks mean, on a card as large as a board."""
+def _legend(task: TabletopTask, width: int, size: int, ambiguity: bool, obstacles: bool) -> Image:
+    """The legend, on a card as large as a panel."""
     marks = [("where the hand starts a reach", _start_mark)]
     if obstacles:
-        marks.append(("virtual obstacle, for the hand to go round", _obstacle_mark))
+        marks.append(("virtual obstacle, which the hand goes round", _obstacle_mark))
     if task.configuration:
         marks.append(("where an object belongs", _slot_mark))
     row = round(2.1 * size)
     card = np.empty((Frame.of(task.layout.table, width).height, width, 3), np.uint8)
     card[...] = rgb(TABLE["page"])
-    scale = draw_doubt_scale(width) if doubt else card[:0]
-    words = fit_text("shortest reaches, by how far their goal is", size, TABLE["ink_soft"], width)
-    top = max(0, (len(card) - row * len(marks) - (len(scale) + row if doubt else 0)) // 2)
+    scale = draw_ambiguity_scale(width) if ambiguity else card[:0]
+    words = fit_text("shortest reaches, by how ambiguous their goal is", size, TABLE["ink_soft"], width)
+    top = max(0, (len(card) - row * len(marks) - (len(scale) + row if ambiguity else 0)) // 2)
     for text, mark in marks:
         paste(card, mark(row), top, size)
         line = fit_text(text, size, TABLE["ink_soft"], max(1, width - row - 2 * size))
         paste(card, line, top + (row - len(line.colour)) // 2 + 1, row + round(1.4 * size))
         top += row
-    if doubt and top + row + len(scale) <= len(card):
+    if ambiguity and top + row + len(scale) <= len(card):
         paste(card, words, top + row - len(words.colour), (width - words.colour.shape[1]) // 2)
         card[top + row : top + row + len(scale)] = scale
     return card
