@@ -126,12 +126,12 @@ def reproduce(
 
     Writes result files, tables, figures and report.html. Interrupted, it goes on where it stopped.
     """
-    from benchmarks.trials import CellsFailed
-    from benchmarks.trials.progress import CellsProgress
+    from benchmarks.trials import TrialsFailed
+    from benchmarks.trials.progress import TrialsProgress
 
     folder = out or Path("runs") / (f"{experiment}-quick" if quick else experiment)
     try:
-        with CellsProgress(False if quiet else None) as progress:
+        with TrialsProgress(False if quiet else None) as progress:
             report = run_experiment(
                 experiment,
                 folder,
@@ -142,9 +142,9 @@ def reproduce(
                 progress=progress,
             )
     except KeyboardInterrupt:
-        click.echo(f"stopped; finished cells are kept in {folder}, the same command goes on from there", err=True)
+        click.echo(f"stopped; finished trials are kept in {folder}, the same command goes on from there", err=True)
         raise click.exceptions.Exit(130) from None
-    except CellsFailed as error:
+    except TrialsFailed as error:
         raise click.ClickException(str(error)) from error
     _tell(folder)
     click.echo(f"report {report}")

@@ -14,7 +14,7 @@ from predictors.evaluation.figures import COLOURS, Drawing, accuracy_figure, foo
 if TYPE_CHECKING:
     import pandas as pd
 
-    from predictors.evaluation.statistics import Comparison
+    from predictors.evaluation.comparison import Comparison
 
 __all__ = [
     "Agreement",
@@ -65,7 +65,7 @@ def figures_of_merit(rows: pd.DataFrame, orders: Mapping[str, Sequence[str]]) ->
     """Means over fractions and layouts, and ``accuracy_sd``, the spread of accuracy between layouts.
 
     Args:
-        rows: ``metrics`` rows, as of :func:`benchmarks.experiments.trial_rows.judged_rows`.
+        rows: ``metrics`` rows, as of :func:`benchmarks.experiments.trial_rows.accuracy_rows`.
         orders: The columns that there is a row for each combination of, and their values in order.
     """
     keys, names = list(orders), ["accuracy", "f1", "precision", "recall", "log_loss", "calibration_error"]
@@ -169,7 +169,7 @@ def compare_layouts(rows: pd.DataFrame, predictor: str) -> tuple[Comparison, Com
         rows: ``predictor, condition, layout, participant, fraction, correct``.
         predictor: Whose.
     """
-    from predictors.evaluation.statistics import compare_conditions
+    from predictors.evaluation.comparison import compare_conditions
 
     own = rows[rows["predictor"] == predictor]
     own = own.assign(participant=own["condition"] + "/" + own["layout"].astype(str))
@@ -185,7 +185,7 @@ def compare_people(rows: pd.DataFrame, predictor: str, shown: pd.DataFrame) -> t
         predictor: Whose.
         shown: ``condition, layout``, one row for each condition.
     """
-    from predictors.evaluation.statistics import compare_conditions
+    from predictors.evaluation.comparison import compare_conditions
 
     own = shown[["condition", "layout"]].merge(rows[rows["predictor"] == predictor], on=["condition", "layout"])
     return compare_conditions(own, correct_fractions="holm"), compare_conditions(own, at="mean")

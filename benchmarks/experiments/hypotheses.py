@@ -15,12 +15,11 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["HYPOTHESES", "Hypotheses", "assess_hypotheses", "hedges_g", "reached_at"]
+__all__ = ["HYPOTHESES", "Hypotheses", "assess_hypotheses", "reached_at"]
 
 HYPOTHESES: Final = {
     "H1": "People are predicted more accurately, averaged over all points of observation.",
@@ -203,7 +202,8 @@ def _pairs(
     part: pd.DataFrame, treatment: str, controls: Sequence[str], unit: str, alpha: float
 ) -> tuple[dict[str, dict[str, Any]], pd.DataFrame]:
     """The treatment against each control: the mean over fractions, and each fraction."""
-    from predictors.evaluation.statistics import compare_conditions
+    from predictors.evaluation.comparison import compare_conditions
+    from predictors.evaluation.statistics import hedges_g
 
     table = _balanced(part, unit, "correct")
     mean = compare_conditions(table, at="mean", alpha=alpha)
@@ -271,7 +271,7 @@ def _less_data(
     """The treatment with a share of its data against each control with all."""
     import pandas as pd
 
-    from predictors.evaluation.statistics import compare_conditions
+    from predictors.evaluation.comparison import compare_conditions
 
     some = part[(part["condition"] == treatment) & np.isclose(part["share"], share)]
     whole = part[part["condition"].isin(controls) & np.isclose(part["share"], part["share"].max())]
@@ -284,21 +284,6 @@ def _less_data(
         rows[control] = _row(treatment, control, means, pair, float("nan"), alpha)
         rows[control]["note"] = f"{share:.0%} of the data against all of it".replace("%", " %")
     return rows
-
-
-def hedges_g(a: npt.NDArray[np.float64], b: npt.NDArray[np.float64]) -> float:
-    """Difference of two means in units of their pooled spread, with Hedges' (1981) correction for small samples.
-
-    NaN where a sample has fewer than two values, infinite where nothing varies but means differ.
-    """
-    if min(len(a), len(b)) < 2:
-        return float("nan")
-    freedom = len(a) + len(b) - 2
-    pooled = np.sqrt((((a - a.mean()) ** 2).sum() + ((b - b.mean()) ** 2).sum()) / freedom)
-    difference = float(a.mean() - b.mean())
-    if pooled < 1e-12:
-        return 0.0 if abs(difference) < 1e-12 else float(np.copysign(np.inf, difference))
-    return difference / float(pooled) * (1 - 3 / (4 * freedom - 1))
 
 
 def reached_at(fractions: Sequence[float], accuracy: Sequence[float], level: float) -> float:

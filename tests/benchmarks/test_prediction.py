@@ -24,8 +24,8 @@ from benchmarks.experiments.prediction.sweep import (
     PREDICTORS,
     REFERENCE,
     Experiment,
-    Setting,
 )
+from benchmarks.experiments.predictor_settings import PredictorSetting
 from legible_envs.datasets.pointing import load_pointing
 from predictors.neural import training
 
@@ -66,14 +66,18 @@ def test_a_row_says_what_was_measured_and_the_difference() -> None:
 
 
 def test_those_that_take_minutes_are_repeated_less_often() -> None:
-    settings = [Setting("a", "bayesian"), Setting("b", "shortest-distance"), Setting("c", "bayesian", repeats=1)]
+    settings = [
+        PredictorSetting("a", "bayesian"),
+        PredictorSetting("b", "shortest-distance"),
+        PredictorSetting("c", "bayesian", max_repeats=1),
+    ]
     assert [(count, list(made)) for count, made in run._by_repeats(settings, 3)] == [(3, ["a", "b"]), (1, ["c"])]
     assert [(count, list(made)) for count, made in run._by_repeats(settings, 1)] == [(1, ["a", "b", "c"])]
 
 
 def test_an_experiment_has_no_other_settings() -> None:
     with pytest.raises(TypeError, match="flods"):
-        run.score_every_walk(flods=3)
+        run.score_every_trajectory(flods=3)
 
 
 def judged(monkeypatch: pytest.MonkeyPatch) -> list[Experiment]:

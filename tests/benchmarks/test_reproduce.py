@@ -16,19 +16,19 @@ from PIL import Image
 from benchmarks.cli import reproduce as reproducing
 from benchmarks.cli.app import main
 from benchmarks.reports.experiment_report import Section, write_experiment_report, write_tables
-from benchmarks.trials import run_cells
+from benchmarks.trials import run_trials
 from legible_envs.datasets.overcooked_2019 import RecordingsError
 
 
 @pytest.fixture
 def small_experiment(monkeypatch: pytest.MonkeyPatch) -> None:
-    """An experiment like the real ones: cells, a table from their results, sections from the table."""
+    """An experiment like the real ones: trials, a table from their results, sections from the table."""
     module, analysis = types.ModuleType("small_experiment"), types.ModuleType("small_experiment.analysis")
 
     def reproduce(folder, *, quick, seeds, workers, scheduler, progress):
-        cells = [{"seed": seed} for seed in range(seeds or (2 if quick else 4))]
-        rows = run_cells(
-            "tests.benchmarks.cell_functions:draw", cells, folder, workers=1, scheduler=scheduler, progress=progress
+        trials = [{"seed": seed} for seed in range(seeds or (2 if quick else 4))]
+        rows = run_trials(
+            "tests.benchmarks.trial_functions:draw", trials, folder, workers=1, scheduler=scheduler, progress=progress
         )
         write_tables(folder / "tables", [("values", rows)])
 

@@ -16,7 +16,7 @@ from sklearn.exceptions import NotFittedError
 
 import predictors.registry as registry
 from benchmarks.experiments.prediction import UNTRAINED, accuracy_table, score_recorded_play
-from benchmarks.experiments.prediction.run import score_every_walk
+from benchmarks.experiments.prediction.run import score_every_trajectory
 from benchmarks.experiments.prediction.sweep import LAYOUTS
 from legible_envs.datasets.overcooked_2019 import RecordingsError, load_recorded_games
 from legible_envs.errors import LayoutError
@@ -443,8 +443,8 @@ def test_recorded_people_are_read_as_well_as_measured_before() -> None:
 @pytest.mark.data
 @pytest.mark.usefixtures("recorded")
 def test_candidates_of_the_running_game_are_judged_apart() -> None:
-    rows = score_every_walk(layouts=("cramped_room",), fractions=(0.5,), candidate_set="game", repeats=1)
+    rows = score_every_trajectory(layouts=("cramped_room",), fractions=(0.5,), candidate_set="game", repeats=1)
     assert rows.attrs["candidate_set"] == "game"
     assert 0 < rows["trajectory"].nunique() < 424
-    with pytest.raises(ValueError, match="no walks to score"):
-        score_every_walk(layouts=("random0",))
+    with pytest.raises(ValueError, match="no trajectories to evaluate"):
+        score_every_trajectory(layouts=("random0",))

@@ -11,7 +11,7 @@ from benchmarks.experiments.optimizers.figures import anytime_figure
 from benchmarks.experiments.optimizers.sweep import LOCAL_SEARCH, METHODS, OPTIMUM_5X5, OURS, PAPER_METHODS, PUBLISHED
 from benchmarks.reports.experiment_report import Section, write_tables
 from predictors.evaluation.figures import save_figure
-from predictors.evaluation.statistics import holm
+from predictors.evaluation.statistics import hedges_g, holm
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -106,8 +106,9 @@ def pairwise(ends: pd.DataFrame) -> pd.DataFrame:
 
     Returns:
         Columns ``grid, budget, a, b, difference`` (of means, a - b), ``superiority`` (Vargha and Delaney's A: the
-        probability that a search by ``a`` ends better than one by ``b``, ties counting half), ``hedges_g`` (NaN without
-        any variance), ``p`` and ``p_holm`` (Holm's correction over all pairs at that grid and budget).
+        probability that a search by ``a`` ends better than one by ``b``, ties counting half), ``hedges_g``
+        (infinite or 0 where nothing varies, see :func:`predictors.evaluation.statistics.hedges_g`), ``p`` and
+        ``p_holm`` (Holm's correction over all pairs at that grid and budget).
     """
     import pandas as pd
     from scipy.stats import mannwhitneyu
@@ -163,17 +164,6 @@ def leaderboard(best: pd.DataFrame) -> pd.DataFrame:
         .reset_index()
         .assign(budget=budget)[["method", "budget", *table.columns]]
     )
-
-
-def hedges_g(x: np.ndarray[Any, Any], y: np.ndarray[Any, Any]) -> float:
-    """Difference of means in pooled standard deviations, corrected for small samples; NaN without any variance."""
-    freedom = len(x) + len(y) - 2
-    if freedom < 1:
-        return float("nan")
-    pooled = np.sqrt((((x - x.mean()) ** 2).sum() + ((y - y.mean()) ** 2).sum()) / freedom)
-    if pooled < 1e-12:
-        return float("nan")
-    return float((x.mean() - y.mean()) / pooled * (1 - 3 / (4 * freedom - 1)))
 
 
 def gaps(ends: pd.DataFrame) -> pd.DataFrame:

@@ -82,9 +82,9 @@ def sections(folder: str | Path) -> list[Section]:
         Section(
             "What is taken for what, and what is learned",
             f"Confusions in the layouts shown, {results.walkers[0]} people, all fractions observed together; and what "
-            "each cell is worth to these people (negative cost) as MaxEnt inverse reinforcement learning sees it. "
+            "each trial is worth to these people (negative cost) as MaxEnt inverse reinforcement learning sees it. "
             "The walkers have only mild likings of their own, so that these maps are flat where nobody walks and "
-            "show mostly which cells people's ways share.",
+            "show mostly which trials people's ways share.",
             {},
             drawn["confusion"],
         ),
@@ -129,7 +129,7 @@ def _about_layouts(results: tables.Results, layouts: pd.DataFrame) -> str:
         f"{count} layouts per condition. Random is the median by legibility of as many random layouts as a search "
         "begins with; the others are the best a search found for the expected walking distance (Efficient), for "
         "legibility (Legible), and for the sum of both, each standardised (Legible-Efficient). Shown is the best of "
-        "each, a middle one of the random; the shade says how often the goal is in doubt on a cell. Legibility is "
+        "each, a middle one of the random; the shade says how often the goal is in doubt on a trial. Legibility is "
         f"Eq. 3 per sequence. Mean legibility rises from {means['legibility']['Random']:.1f} (Random) over "
         f"{means['legibility']['Efficient']:.1f} (Efficient) to {means['legibility']['Legible']:.1f} (Legible). It is "
         f"paid for in steps: people in legible layouts walk {steps:.1f} times as far as in efficient ones "
@@ -143,7 +143,7 @@ def _about_people(results: tables.Results) -> str:
         "People are simulated. Two kinds, neither of them the walker that layouts are scored with (which takes a "
         "shortest path): noisily rational ones (a softmax over steps), and planners who look a few steps ahead, "
         "dislike turning, avoid where they have just been, and slip. What differs between people: rationality, "
-        f"or the cost of turning and the rate of slips; and the cost of each cell (log spread {PREFERENCE:g}, an "
+        f"or the cost of turning and the rate of slips; and the cost of each trial (log spread {PREFERENCE:g}, an "
         "assumption: recorded walks are too few to fit it). Each person cooks three soups. Walks with one valid goal "
         "are left out: there is nothing to predict."
     )

@@ -34,7 +34,7 @@ class Results:
 
     Attributes:
         layouts: A row per layout.
-        elites: A row per cell of the archive of each search.
+        elites: A row per trial of the archive of each search.
         fits: What was fitted to recorded people; empty where there were none.
         readings: ``accuracy``, ``metrics``, ``confusion`` and ``cost`` rows.
         curves: Learning curves.

@@ -248,7 +248,7 @@ def team_differences(results: Results, reader: str) -> pd.DataFrame:
     """Each measure in each condition against the Baseline: Tukey's interval and p, people as units."""
     import pandas as pd
 
-    from predictors.evaluation.statistics import compare_conditions
+    from predictors.evaluation.comparison import compare_conditions
 
     people, parts = team_people(results), []
     own = people[people["reader"] == reader]
