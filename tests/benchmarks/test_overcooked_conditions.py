@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks.experiments.overcooked import analysis, run, tables
+from benchmarks.experiments.overcooked import analysis, narrative, run, tables
 from benchmarks.experiments.overcooked.sweep import (
     CONDITIONS,
     FITTED,
@@ -175,8 +175,8 @@ def test_a_run_writes_tables_figures_and_words(folder: Path) -> None:
     titles = [section.title for section in sections]
     assert "Hypotheses" in titles
     assert "Beside the paper" in titles
-    people = next(section for section in sections if section.title == "People")
-    assert "The recordings are not there" in people.text
+    participants = next(section for section in sections if section.title == "Participants")
+    assert "The recordings are not there" in participants.text
     for section in sections:
         assert all(path.is_file() and path.stat().st_size > 500 for path in section.figures)
         assert all(len(table) for table in section.tables.values())
@@ -243,16 +243,16 @@ def beside(ours: dict[str, float]) -> pd.DataFrame:
 
 def test_words_follow_the_figures() -> None:
     paper = {name: PUBLISHED[name]["f1"] for name in CONDITIONS}
-    same = analysis.agreement(beside(paper))
+    same = narrative.about_agreement(beside(paper))
     assert "the same order of conditions as in the paper" in same
     assert "about as much as the paper's +0.322" in same
     turned = dict(zip(CONDITIONS, reversed(paper.values()), strict=True))
-    reverse = analysis.agreement(beside(turned))
+    reverse = narrative.about_agreement(beside(turned))
     assert "6 of 6 pairs of conditions in another order" in reverse
     assert "by -0.322 over random ones, less than" in reverse
     for name, other in itertools.pairwise(CONDITIONS):
         swapped = {**paper, name: paper[other], other: paper[name]}
-        assert "1 of 6 pairs of conditions in another order" in analysis.agreement(beside(swapped))
+        assert "1 of 6 pairs of conditions in another order" in narrative.about_agreement(beside(swapped))
 
 
 def test_settings_can_be_changed_by_users() -> None:

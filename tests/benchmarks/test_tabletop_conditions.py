@@ -299,17 +299,18 @@ def test_words_follow_the_numbers() -> None:
                 for c, v in {"Random": 0.1, **values}.items()
             ]
         )
-        return narrative.agreement(tables.beside_published(metrics, ["A", "B"]), metrics, ["A", "B"])
+        return narrative.about_agreement(tables.beside_published(metrics, ["A", "B"]), metrics, ["A", "B"])
 
     paper = {name: known["f1"] for name, known in sweep.PUBLISHED.items()}
     same = rows(paper)
     assert "in the paper's order" in same
     assert "about as much as the paper's +0.232" in same
-    assert "2 read Both best" in same
+    assert "F1 is highest at Both for 2 of our 2 predictors (A, B), and in the paper's order" in same
+    assert "over all four conditions for 2 (A, B)" in same
     turned = rows({**paper, "Both": 0.1})
     assert "3 of 6 pairs in another order" in turned
     assert "less than the paper's" in turned
-    assert "0 read Both best of the four (none)" in turned
+    assert "F1 is highest at Both for 0 of our 2 predictors (none)" in turned
 
 
 def test_words_say_where_people_who_ignore_obstacles_cost_more_than_they_gain() -> None:

@@ -6,7 +6,7 @@ import dataclasses
 import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 __all__ = [
     "FULL",
@@ -111,13 +111,23 @@ def grid_name(shape: Shape) -> str:
     return f"{shape[0]}x{shape[1]}"
 
 
+class _Job(NamedTuple):
+    """Every method on every grid, with so many seeds, at one budget; ``evaluations`` is None for the paper's."""
+
+    budget: str
+    evaluations: int | None
+    seeds: int
+    grids: tuple[Shape, ...]
+    methods: tuple[str, ...]
+
+
 def trials_of(settings: Settings) -> list[dict[str, Any]]:
     """One trial per grid, budget, method and seed; those of small budgets first, so that a stop leaves whole tables."""
-    jobs: list[tuple[str, int | None, int, tuple[Shape, ...], tuple[str, ...]]] = []
+    jobs: list[_Job] = []
     if settings.iterations:
-        jobs.append(("paper", None, settings.seeds, settings.grids, tuple(PAPER_BUDGETS)))
-    jobs += [(f"{n}", n, settings.seeds, settings.grids, METHODS) for n in settings.budgets]
-    jobs += [(f"{n}", n, seeds, (shape,), settings.large_methods) for n, shape, seeds in settings.large]
+        jobs.append(_Job("paper", None, settings.seeds, settings.grids, tuple(PAPER_BUDGETS)))
+    jobs += [_Job(f"{n}", n, settings.seeds, settings.grids, METHODS) for n in settings.budgets]
+    jobs += [_Job(f"{n}", n, seeds, (shape,), settings.large_methods) for n, shape, seeds in settings.large]
     trials: dict[str, dict[str, Any]] = {}
     for budget, evaluations, seeds, grids, methods in jobs:
         for shape, seed, method in itertools.product(grids, range(seeds), methods):

@@ -64,7 +64,8 @@ FITTED: Final[Mapping[str, Any]] = {
 }  # fmt: skip
 """People for where the recordings are absent; what :mod:`.planner_fitting` fitted to them."""
 FITTED_SOURCE: Final = (
-    "2,406 walks of 34 people in four kitchens, Overcooked-AI's published games of 2019 (Carroll et al., NeurIPS 2019)"
+    "2,406 trajectories of 34 people in four kitchens, "
+    "Overcooked-AI's published games of 2019 (Carroll et al., NeurIPS 2019)"
 )
 
 PREDICTORS: Final = (
