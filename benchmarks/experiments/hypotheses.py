@@ -94,7 +94,7 @@ class Hypotheses:
         return {
             "name": name,
             "statement": statement,
-            "tested": int((row != "–").sum()),
+            "tested": sum(said != "–" for said in row),
             "against": [str(predictor) for predictor, said in row.items() if said == "not supported"],
             "difference": _range(part["difference"]),
             "between_units": _range(part["g_units"]),
@@ -124,7 +124,7 @@ def assess_hypotheses(
 
     Args:
         rows: One per predictor, participant and fraction observed: ``predictor, condition, participant, fraction,
-            correct`` (mean over the participant's walks), and ``layout`` where a condition has several.
+            correct`` (mean over the participant's trajectories), and ``layout`` where a condition has several.
         treatment: The condition in which goals should be predicted better.
         controls: The conditions to beat, each of them.
         curves: Learning curves: ``predictor, condition, share`` (of the training data, up to 1), ``accuracy``, and a

@@ -11,13 +11,14 @@ import pytest
 from scipy import stats
 
 from benchmarks.experiments.recorded import analysis, run
-from benchmarks.experiments.recorded.analysis import correlate, detectable, places_of, spearman, spearman_rows
+from benchmarks.experiments.recorded.analysis import correlate, places_of
 from benchmarks.experiments.recorded.sweep import FULL, QUICK, accuracy_trials, score_trials
 from benchmarks.trials import run_trials
 from legible_envs.legibility import From, goal_legibility
 from legible_envs.overcooked import OvercookedLayout
 from legible_envs.overcooked.humans import simulate_participants
 from legible_envs.overcooked.scoring.explanation import grid_graph
+from predictors.evaluation.rank_correlation import detectable, spearman, spearman_rows
 
 
 def logged(slope: float, places: int = 20, people: int = 12, seed: int = 0) -> tuple[pd.DataFrame, pd.DataFrame]:

@@ -29,6 +29,7 @@ from benchmarks.reports.experiment_report import Section
 from legible_envs.rollouts import Trajectory
 from legible_envs.tabletop import TabletopLayout, TabletopTask, TabletopWorkspace
 from predictors.base import NoReader
+from predictors.evaluation import learning_curve
 
 SMALL = Settings(
     layouts=2,
@@ -215,6 +216,10 @@ def test_learning_curves_begin_where_every_goal_is_known() -> None:
     few = [reach for reach in reaches if len(reach.candidates) == 2]
     with pytest.raises(ValueError, match="mention every goal"):
         curve_rows(PredictorSetting("k-NN", "reach-knn").make(), few, shares=(0.05,), repeats=1, seed=0, rare="redraw")
+    with pytest.raises(ValueError, match="single trajectories"):
+        learning_curve("reach-knn", reaches, groups="participant", rare="redraw")
+    with pytest.raises(ValueError, match="'error' or 'redraw', got 'keep'"):
+        learning_curve("reach-knn", reaches, rare="keep")  # type: ignore[arg-type]
 
 
 # -- the whole of it --------------------------------------------------------------------------------------------------
@@ -326,6 +331,14 @@ def test_words_say_where_people_who_ignore_obstacles_cost_more_than_they_gain() 
     text = narrative.about_compliance(table)
     assert "Virtual Obstacle goes from 0.900 to 0.700, below Placement from 50 % on" in text
     assert "Both goes from 0.950 to 0.910, never below Placement" in text
+
+
+def test_a_robot_without_prediction_is_known_in_earlier_results(results: tables.Results, tmp_path: Path) -> None:
+    for name in ("layouts", "curves", "spreads"):
+        getattr(results, name).to_csv(tmp_path / f"{name}.csv", index=False)
+    stacked(results.readings, "table").to_csv(tmp_path / "readings.csv", index=False)
+    results.teams.replace({"reader": {sweep.ALONE: "reads nothing"}}).to_csv(tmp_path / "teams.csv", index=False)
+    assert set(tables.load_results(tmp_path).teams["reader"]) == {"Eq. 1", sweep.NO_PREDICTION}
 
 
 def test_an_analysis_without_results_says_what_to_do(tmp_path: Path) -> None:

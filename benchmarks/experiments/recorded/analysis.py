@@ -10,12 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks.experiments.recorded.sweep import BOOTSTRAPS, MIN_WALKS
+from benchmarks.experiments.trial_rows import logged_rows
 from benchmarks.reports.experiment_report import Section, write_tables
+from predictors.evaluation.rank_correlation import detectable, spearman, spearman_rows
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["correlate", "detectable", "places_of", "sections", "spearman"]
+__all__ = ["correlate", "places_of", "sections"]
 
 Floats = npt.NDArray[np.float64]
 Level = Literal["stage", "reach"]
@@ -38,7 +40,7 @@ def sections(folder: str | Path, *, bootstraps: int = BOOTSTRAPS) -> list[Sectio
     from benchmarks.experiments.recorded.narrative import about_correlations
 
     folder = Path(folder)
-    scores, readings = (_read(folder / f"{name}.csv") for name in ("scores", "readings"))
+    scores, readings = (logged_rows(folder, name, "overcooked").fillna({"goal": ""}) for name in ("scores", "readings"))
     places = {level: places_of(scores, readings, level) for level in LEVELS}
     correlations = pd.concat(
         [correlate(scores, readings, level, bootstraps=bootstraps).assign(level=level) for level in LEVELS],
@@ -58,15 +60,6 @@ def sections(folder: str | Path, *, bootstraps: int = BOOTSTRAPS) -> list[Sectio
             figures,
         )
     ]
-
-
-def _read(path: Path) -> pd.DataFrame:
-    import pandas as pd
-
-    if not path.is_file():
-        raise FileNotFoundError(f"{path} is missing; run the experiment on recorded people first")
-    table = pd.read_csv(path)
-    return table.assign(goal=table["goal"].fillna(""))
 
 
 # -- places -----------------------------------------------------------------------------------------------------------
@@ -120,35 +113,6 @@ def _kitchens(stages: pd.DataFrame) -> pd.DataFrame:
 
 
 # -- correlation ------------------------------------------------------------------------------------------------------
-
-
-def spearman(x: Floats, y: Floats) -> float:
-    """Spearman's rank correlation, ties averaged; NaN where one side does not vary or there are fewer than three."""
-    return float(spearman_rows(x[None], y[None])[0])
-
-
-def spearman_rows(x: Floats, y: Floats) -> Floats:
-    """``(k,)`` :func:`spearman` of each row of ``x (k, n)`` with that of ``y (k, n)``."""
-    from scipy.stats import rankdata
-
-    if x.shape[1] < 3:
-        return np.full(len(x), np.nan)
-    a, b = (rankdata(values, axis=1) - (x.shape[1] + 1) / 2 for values in (x, y))
-    spread = np.sqrt((a**2).sum(axis=1) * (b**2).sum(axis=1))
-    varies = spread > 0
-    return np.where(varies, (a * b).sum(axis=1) / np.where(varies, spread, 1.0), np.nan)
-
-
-def detectable(n: int, power: float = 0.8, alpha: float = 0.05) -> float:
-    """The rank correlation that a two-sided test on ``n`` pairs finds with a given power.
-
-    By Fisher's z with the variance 1.06 / (n - 3) of ranks (Fieller, Hartley and Pearson, 1957); NaN for ``n < 5``.
-    """
-    from scipy.stats import norm
-
-    if n < 5:
-        return float("nan")
-    return float(np.tanh((norm.ppf(1 - alpha / 2) + norm.ppf(power)) * np.sqrt(1.06 / (n - 3))))
 
 
 def correlate(

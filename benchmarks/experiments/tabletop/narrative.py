@@ -74,8 +74,10 @@ def about_accuracy(results: Results, metrics: pd.DataFrame, anova: pd.DataFrame)
 
 def _extremes(values: pd.Series[float]) -> dict[str, dict[str, Any]]:
     """The lowest and the highest value, each with its name."""
-    places = {"low": values.idxmin(), "high": values.idxmax()}
-    return {which: {"name": name, "value": float(values[name])} for which, name in places.items()}
+    return {
+        "low": {"name": values.idxmin(), "value": float(values.min())},
+        "high": {"name": values.idxmax(), "value": float(values.max())},
+    }
 
 
 def _starts(results: Results) -> dict[str, Any] | None:

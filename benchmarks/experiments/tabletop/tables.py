@@ -111,7 +111,7 @@ def best_layouts(results: Results) -> pd.DataFrame:
     return pd.DataFrame(chosen).reset_index(drop=True)
 
 
-# -- how well goals are predicted ------------------------------------------------------------------------------------
+# -- how well goals are predicted -------------------------------------------------------------------------------------
 
 
 def accuracy_rows(results: Results) -> pd.DataFrame:
@@ -142,7 +142,7 @@ def beside_published(metrics: pd.DataFrame, predictors: list[str]) -> pd.DataFra
 def compliance_table(results: Results) -> pd.DataFrame:
     """Accuracy, mean over fractions and layouts, by how often participants reach across obstacles.
 
-    They reach as if there were none. A row per predictor and rate; beside the conditions with obstacles, Placement, which has none to ignore.
+    A row per predictor and rate; beside the conditions with obstacles, Placement, which has none to ignore.
     """
     keys = ["predictor", "crossing", "condition"]
     rows = results.readings["metrics"]
@@ -217,7 +217,7 @@ def spread_beside_published(spread: pd.DataFrame) -> pd.DataFrame:
     return conditions.beside_published(PUBLISHED_SPREAD, ours)
 
 
-# -- teams ---------------------------------------------------------------------------------------------------
+# -- teams ------------------------------------------------------------------------------------------------------------
 
 
 def team_people(results: Results) -> pd.DataFrame:
