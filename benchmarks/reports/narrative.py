@@ -49,8 +49,14 @@ def _environment() -> Environment:
     loader = PackageLoader("benchmarks", "templates/experiments")
     # Plain text: the page escapes it.
     made = Environment(loader=loader, undefined=StrictUndefined, autoescape=False, trim_blocks=True, lstrip_blocks=True)
-    made.filters |= {"fmt": format, "each": _each, "listed": _listed}
+    made.filters |= {"fmt": _formatted, "each": _each, "listed": _listed}
     return made
+
+
+def _formatted(value: Any, spec: str) -> str:
+    from jinja2 import Undefined
+
+    return str(value) if isinstance(value, Undefined) else format(value, spec)  # str of a missing value is the error
 
 
 def _each(pairs: Iterable[Pair], pattern: str, separator: str = ", ") -> str:

@@ -301,14 +301,7 @@ def learning_curve(
     named = _named(predictors)
     rng = np.random.default_rng(seed)
     rows = []
-    if rare == "redraw":
-        if groups is not None:
-            raise ValueError("rare='redraw' draws splits of single trajectories; use groups=None")
-        splits = _redrawn(walks, sizes, test_share, repeats, rng)
-    elif rare == "error":
-        splits = [nested_training_sets(walks, test_share, rng, groups) for _ in range(repeats)]
-    else:
-        raise ValueError(f"`rare` must be 'error' or 'redraw', got {rare!r}")
+    splits = _splits(walks, sizes, test_share, repeats, rng, groups, rare)
     # Groups are of different sizes: the smallest pool decides, so that every repeat has the same training sizes.
     counts = _sizes(sizes, min(len(pool) for pool, _ in splits))
     for repeat, (pool, test) in enumerate(splits):
@@ -326,16 +319,28 @@ def learning_curve(
     return LearningCurve(pd.DataFrame(rows, columns=columns), cut, ties, walks[0].candidate_set, test_share)
 
 
-def _redrawn(
-    walks: Sequence[Trajectory], sizes: Sequence[int | float], test_share: float, repeats: int, rng: np.random.Generator
+def _splits(
+    trajectories: Sequence[Trajectory],
+    sizes: Sequence[int | float],
+    test_share: float,
+    repeats: int,
+    rng: np.random.Generator,
+    groups: Groups | None,
+    rare: str,
 ) -> list[Split]:
-    """Splits whose smallest training set mentions every goal."""
-    names = {name for walk in walks for name in walk.candidates}
+    """Pools to learn from and test sets, one pair per repeat."""
+    if rare == "error":
+        return [nested_training_sets(trajectories, test_share, rng, groups) for _ in range(repeats)]
+    if rare != "redraw":
+        raise ValueError(f"`rare` must be 'error' or 'redraw', got {rare!r}")
+    if groups is not None:
+        raise ValueError("rare='redraw' draws splits of single trajectories; use groups=None")
+    names = {name for trajectory in trajectories for name in trajectory.candidates}
     found: list[Split] = []
     for seed in rng.integers(2**31, size=_REDRAWS).tolist():
-        pool, test = nested_training_sets(walks, test_share, np.random.default_rng(seed))
+        pool, test = nested_training_sets(trajectories, test_share, np.random.default_rng(seed))
         least = _sizes(sizes, len(pool))[0]
-        if {name for i in pool[:least] for name in walks[i].candidates} == names:
+        if {name for i in pool[:least] for name in trajectories[i].candidates} == names:
             found.append((pool, test))
         if len(found) == repeats:
             return found

@@ -320,7 +320,7 @@ def test_score_judges_predictors_and_reports_them(run: Path, walks_of_run: Path)
     page, report = (folder / "report.html").read_text(), (run / "report.html").read_text()
     for text in (page, report):
         assert text.count("data:image/svg+xml;base64,") == 3
-        assert "People, read by predictors" in text
+        assert "Goal prediction" in text
         assert "http://" not in text.replace("http://www.w3.org", "")
     assert legible("report", run).exit_code == 0
     assert (run / "report.html").read_text() == report

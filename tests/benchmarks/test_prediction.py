@@ -1,4 +1,4 @@
-"""The benchmark on recorded people: its tables, its command, and what it reads."""
+"""The benchmark on recorded people: its tables, its command, and what it loads."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ RECORDED = scores(
 )
 
 
-def test_references_belong_to_predictors_that_are_judged() -> None:
+def test_references_belong_to_predictors_that_are_evaluated() -> None:
     assert set(REFERENCE) <= {setting.label for setting in (*PREDICTORS, *NEURAL)}
     assert set(POINTING_REFERENCE) <= {setting.label for setting in (*POINTING_PREDICTORS, *POINTING_NEURAL)}
     for settings in ((*PREDICTORS, *NEURAL), (*POINTING_PREDICTORS, *POINTING_NEURAL)):
@@ -80,7 +80,7 @@ def test_an_experiment_has_no_other_settings() -> None:
         run.score_every_trajectory(flods=3)
 
 
-def judged(monkeypatch: pytest.MonkeyPatch) -> list[Experiment]:
+def evaluated(monkeypatch: pytest.MonkeyPatch) -> list[Experiment]:
     asked: list[Experiment] = []
 
     def score_recorded_play(folder: object, experiment: Experiment, *, tell: object) -> pd.DataFrame:
@@ -98,7 +98,7 @@ def without_torch() -> None:
 
 
 def test_the_command_prints_and_writes_tables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    asked = judged(monkeypatch)
+    asked = evaluated(monkeypatch)
     (tmp_path / "data.csv").touch()
     stream = io.StringIO()
     judge_people(
@@ -111,8 +111,8 @@ def test_the_command_prints_and_writes_tables(tmp_path: Path, monkeypatch: pytes
     assert pd.read_csv(tmp_path / "out" / "kitchens.csv")["mean"].tolist() == [0.35, 0.5]
 
 
-def test_networks_are_judged_where_torch_is_installed(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked = judged(monkeypatch)
+def test_networks_are_evaluated_where_torch_is_installed(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = evaluated(monkeypatch)
     monkeypatch.setattr(training, "require_torch", lambda: None)
     stream = io.StringIO()
     judge_people(Console(file=stream, width=140), layouts=("random3",))

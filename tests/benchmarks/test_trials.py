@@ -143,7 +143,7 @@ def test_bad_functions_and_cells_are_named(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="top of a module"):
         run_trials(lambda trial: {}, TRIALS, tmp_path, workers=1)
     with pytest.raises(ValueError, match="top of a module"):
-        run_trials("tests.benchmarks.trial_functions:nobody", TRIALS, tmp_path, workers=1)
+        run_trials("tests.benchmarks.trial_functions:missing", TRIALS, tmp_path, workers=1)
     with pytest.raises(TrialsFailed, match="column 'value' of a result row holds a ndarray"):
         run_trials(trial_functions.not_rows, TRIALS[:1], tmp_path, workers=1)
     with pytest.raises(ValueError, match="at least 1"):
@@ -153,7 +153,7 @@ def test_bad_functions_and_cells_are_named(tmp_path: Path) -> None:
         run_trials(trial_functions.draw, TRIALS, tmp_path / "file", workers=1)
 
 
-def test_nobody_at_the_address_is_said() -> None:
+def test_a_missing_scheduler_is_named() -> None:
     pytest.importorskip("distributed")
     with pytest.raises(ConnectionError, match=r"no Dask scheduler answers at 'tcp://127.0.0.1:1'"):
         connect("tcp://127.0.0.1:1", timeout=0.5)

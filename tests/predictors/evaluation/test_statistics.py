@@ -158,7 +158,7 @@ def test_hedges_g_has_one_answer_where_nothing_varies_and_where_a_spread_is_unkn
 
 
 def null_experiment(rng: np.random.Generator, people: int = 10, walks: int = 12) -> pd.DataFrame:
-    """Two conditions that do not differ, judged by 4 folds x 3 repeats; people differ from one another."""
+    """Two conditions that do not differ, evaluated by 4 folds x 3 repeats; people differ from one another."""
     parts = []
     for condition in ("a", "b"):
         talent = np.repeat(rng.beta(4, 4, people), walks)
