@@ -40,7 +40,7 @@ class TrialsProgress:
                 TextColumn("{task.fields[status]}"),
                 TimeRemainingColumn(compact=True),
             )
-            self._task = self._bar.add_task("cells", total=None, status="")
+            self._task = self._bar.add_task("trials", total=None, status="")
             self._live = Live(self._bar, console=Console(stderr=True), refresh_per_second=4)
             self._live.start()
         return self
