@@ -35,19 +35,19 @@ class Experiment:
     lede: str
 
 
-_PEOPLE = "People are simulated or recorded here, not the paper's participants."
+_PEOPLE = "Participants are simulated or recorded here, not those of the paper."
 
 EXPERIMENTS: Final = {
     "overcooked": Experiment(
         {".": "benchmarks.experiments.overcooked", "recorded": "benchmarks.experiments.recorded"},
-        "Are legible kitchens read better?",
-        "Random, efficient, legible-efficient and legible kitchens, and who can tell early what a cook reaches for. "
+        "Are goals in legible kitchens predicted better?",
+        "Random, efficient, legible-efficient and legible kitchens, and which predictors tell early where a cook goes. "
         f"{_PEOPLE}",
     ),
     "tabletop": Experiment(
         {".": "benchmarks.experiments.tabletop"},
-        "Are legible tables read better, and does a robot profit?",
-        "Sorted cubes, better places, virtual obstacles, and both; read by predictors, then shared with a robot. "
+        "Are goals at legible tables predicted better, and does a robot profit?",
+        "Sorted cubes, better places, virtual obstacles, and both; goals predicted offline, then by a robot partner. "
         f"{_PEOPLE}",
     ),
     "optimizers": Experiment(
@@ -89,12 +89,12 @@ def run_experiment(
     sections = []
     for part, module in experiment.modules.items():
         sections += _run_part(module, folder / part, how)
-    lede = experiment.lede + (" This is the quick version: few layouts, people and seeds." if quick else "")
+    lede = experiment.lede + (" This is the quick version: few layouts, participants and seeds." if quick else "")
     return write_experiment_report(folder, sections, title=experiment.title, lede=lede)
 
 
 def _run_part(module: str, folder: Path, how: Mapping[str, Any]) -> list[Section]:
-    """Run one part and read its sections; what needs recordings that are not there says so in the report."""
+    """Run one part and return its sections; a part whose recordings are missing says so in the report."""
     from benchmarks.reports.experiment_report import Section
     from legible_envs.datasets.overcooked_2019 import RecordingsError
 
@@ -122,16 +122,16 @@ def reproduce(
     scheduler: str | None,
     quiet: bool,
 ) -> None:
-    """Run an experiment of the paper, and what the paper could not.
+    """Run an experiment of the paper, and what the paper left out.
 
     Writes result files, tables, figures and report.html. Interrupted, it goes on where it stopped.
     """
-    from benchmarks.trials import CellsFailed
-    from benchmarks.trials.progress import CellsProgress
+    from benchmarks.trials import TrialsFailed
+    from benchmarks.trials.progress import TrialsProgress
 
     folder = out or Path("runs") / (f"{experiment}-quick" if quick else experiment)
     try:
-        with CellsProgress(False if quiet else None) as progress:
+        with TrialsProgress(False if quiet else None) as progress:
             report = run_experiment(
                 experiment,
                 folder,
@@ -142,9 +142,9 @@ def reproduce(
                 progress=progress,
             )
     except KeyboardInterrupt:
-        click.echo(f"stopped; finished cells are kept in {folder}, the same command goes on from there", err=True)
+        click.echo(f"stopped; finished trials are kept in {folder}, the same command goes on from there", err=True)
         raise click.exceptions.Exit(130) from None
-    except CellsFailed as error:
+    except TrialsFailed as error:
         raise click.ClickException(str(error)) from error
     _tell(folder)
     click.echo(f"report {report}")

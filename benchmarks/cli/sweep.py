@@ -26,19 +26,19 @@ def sweep(file: Path, out: Path | None, workers: int | None, scheduler: str | No
     from benchmarks.sweeps.analysis import for_reading
     from benchmarks.sweeps.run import run_sweep
     from benchmarks.sweeps.sweep import Sweep
-    from benchmarks.trials import CellsFailed
-    from benchmarks.trials.progress import CellsProgress
+    from benchmarks.trials import TrialsFailed
+    from benchmarks.trials.progress import TrialsProgress
 
     plan = Sweep.from_toml(file)
     folder = out or Path("runs") / plan.name
     failed = None
     try:
-        with CellsProgress(False if quiet else None) as progress:
+        with TrialsProgress(False if quiet else None) as progress:
             rows = run_sweep(plan, folder, workers=workers, scheduler=scheduler, progress=progress)
-    except CellsFailed as error:
+    except TrialsFailed as error:
         rows, failed = error.table, error
     except KeyboardInterrupt:
-        click.echo(f"stopped; finished cells are kept in {folder}, the same command goes on from there", err=True)
+        click.echo(f"stopped; finished trials are kept in {folder}, the same command goes on from there", err=True)
         raise click.exceptions.Exit(130) from None
     if len(rows):
         say().print(table(for_reading(rows)))

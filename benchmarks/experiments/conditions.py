@@ -1,11 +1,11 @@
-"""Conditions compared over their layouts and people: tables, tests, and the figures that show them."""
+"""Conditions compared over their layouts and participants: tables, tests, and the figures that show them."""
 
 from __future__ import annotations
 
 import dataclasses
 import itertools
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -14,16 +14,17 @@ from predictors.evaluation.figures import COLOURS, Drawing, accuracy_figure, foo
 if TYPE_CHECKING:
     import pandas as pd
 
-    from predictors.evaluation.statistics import Comparison
+    from predictors.evaluation.comparison import Comparison
 
 __all__ = [
     "Agreement",
+    "Comparisons",
     "accuracy_by_condition",
     "agreements",
     "bars_by_condition",
     "beside_published",
     "compare_layouts",
-    "compare_people",
+    "compare_participants",
     "figures_of_merit",
     "in_order",
     "learning_by_condition",
@@ -65,7 +66,7 @@ def figures_of_merit(rows: pd.DataFrame, orders: Mapping[str, Sequence[str]]) ->
     """Means over fractions and layouts, and ``accuracy_sd``, the spread of accuracy between layouts.
 
     Args:
-        rows: ``metrics`` rows, as of :func:`benchmarks.experiments.trial_rows.judged_rows`.
+        rows: ``metrics`` rows, as of :func:`benchmarks.experiments.trial_rows.accuracy_rows`.
         orders: The columns that there is a row for each combination of, and their values in order.
     """
     keys, names = list(orders), ["accuracy", "f1", "precision", "recall", "log_loss", "calibration_error"]
@@ -116,19 +117,6 @@ class Agreement:
     least: float
     most: float
 
-    @property
-    def gain_said(self) -> str:
-        """How our gain compares with the paper's, in words."""
-        if abs(self.gain - self.published_gain) < 0.05:
-            return "about as much as"
-        return "less than" if self.gain < self.published_gain else "more than"
-
-    @property
-    def level_said(self) -> str:
-        """How our figures compare with the paper's, in words."""
-        which = "higher" if self.level > 0 else "lower"
-        return f"{which} by {abs(self.level):.3f} on average ({self.least:+.3f} to {self.most:+.3f})"
-
 
 def agreements(published: pd.DataFrame, treatment: str, control: str) -> dict[str, Agreement]:
     """How our F1 agrees with the paper's.
@@ -162,45 +150,57 @@ def agreements(published: pd.DataFrame, treatment: str, control: str) -> dict[st
 # -- tests ------------------------------------------------------------------------------------------------------------
 
 
-def compare_layouts(rows: pd.DataFrame, predictor: str) -> tuple[Comparison, Comparison]:
+class Comparisons(NamedTuple):
+    """Conditions compared.
+
+    Attributes:
+        each: At each fraction observed.
+        overall: Over their mean.
+    """
+
+    each: Comparison
+    overall: Comparison
+
+
+def compare_layouts(rows: pd.DataFrame, predictor: str) -> Comparisons:
     """Conditions with layouts as units, at each fraction and over all: the nested analysis of variance.
 
     Args:
         rows: ``predictor, condition, layout, participant, fraction, correct``.
-        predictor: Whose.
+        predictor: The predictor whose accuracy is compared.
     """
-    from predictors.evaluation.statistics import compare_conditions
+    from predictors.evaluation.comparison import compare_conditions
 
     own = rows[rows["predictor"] == predictor]
     own = own.assign(participant=own["condition"] + "/" + own["layout"].astype(str))
     units = own.groupby(["condition", "participant", "fraction"], sort=False)["correct"].mean().reset_index()
-    return compare_conditions(units, correct_fractions="holm"), compare_conditions(units, at="mean")
+    return Comparisons(compare_conditions(units, correct_fractions="holm"), compare_conditions(units, at="mean"))
 
 
-def compare_people(rows: pd.DataFrame, predictor: str, shown: pd.DataFrame) -> tuple[Comparison, Comparison]:
-    """Conditions in one layout each, with people as units, as in the paper.
+def compare_participants(rows: pd.DataFrame, predictor: str, shown: pd.DataFrame) -> Comparisons:
+    """Conditions in one layout each, with participants as units, as in the paper.
 
     Args:
         rows: As for :func:`compare_layouts`.
-        predictor: Whose.
+        predictor: The predictor whose accuracy is compared.
         shown: ``condition, layout``, one row for each condition.
     """
-    from predictors.evaluation.statistics import compare_conditions
+    from predictors.evaluation.comparison import compare_conditions
 
     own = shown[["condition", "layout"]].merge(rows[rows["predictor"] == predictor], on=["condition", "layout"])
-    return compare_conditions(own, correct_fractions="holm"), compare_conditions(own, at="mean")
+    return Comparisons(compare_conditions(own, correct_fractions="holm"), compare_conditions(own, at="mean"))
 
 
 def variance_rows(rows: pd.DataFrame, predictors: Sequence[str], shown: pd.DataFrame) -> pd.DataFrame:
     """One-way analyses of variance over the conditions at each fraction and over all (``fraction`` is NaN).
 
-    Both with layouts as units and, in the layouts shown, with people as units.
+    Both with layouts as units and, in the layouts shown, with participants as units.
     """
     import pandas as pd
 
     parts = []
     for predictor in predictors:
-        both = {"layout": compare_layouts(rows, predictor), "participant": compare_people(rows, predictor, shown)}
+        both = {"layout": compare_layouts(rows, predictor), "participant": compare_participants(rows, predictor, shown)}
         for unit, comparisons in both.items():
             parts += [found.anova.assign(predictor=predictor, unit=unit) for found in comparisons]
     table = pd.concat(parts, ignore_index=True)

@@ -1,4 +1,4 @@
-"""The hypotheses of the paper as explicit tests: does the workspace help, early, with less data, whoever predicts?
+"""The hypotheses of the paper as explicit tests: does the workspace help, early, with less data, whichever predicts?
 
 The paper (Tung et al., HRI 2024) claims in its abstract that optimised workspaces give "higher robot prediction
 accuracy using less training data", and that the gain is "classifier-agnostic". H1, H2 and H3 below put these claims,
@@ -15,17 +15,18 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
-import numpy.typing as npt
+
+from benchmarks.reports.narrative import narrate
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["HYPOTHESES", "Hypotheses", "assess_hypotheses", "hedges_g", "reached_at"]
+__all__ = ["HYPOTHESES", "Hypotheses", "assess_hypotheses", "reached_at"]
 
 HYPOTHESES: Final = {
-    "H1": "People are predicted more accurately, averaged over all points of observation.",
+    "H1": "Goals are predicted more accurately, averaged over all points of observation.",
     "H2": (
-        "They are predicted earlier: more accurately over the first half of what is observed, and nowhere less so "
+        "Goals are predicted earlier: more accurately over the first half of what is observed, and nowhere less so "
         "significantly."
     ),
     "H3": "Less data is needed: more accurate with a part of the training data than others with all of theirs.",
@@ -43,11 +44,11 @@ class Hypotheses:
     Attributes:
         tests: A row per hypothesis, predictor and control: ``hypothesis, predictor, treatment, control, mean, control
             mean, difference, low, high, p, g_units, g_people, supported`` and ``note``. ``low`` to ``high`` is Tukey's
-            simultaneous interval, ``p`` Tukey's; ``g_units`` is Hedges' g between units, ``g_people`` between people
-            whatever their layout (NaN where people are not told apart).
+            simultaneous interval, ``p`` Tukey's; ``g_units`` is Hedges' g between units, ``g_people`` between
+            participants whatever their layout (NaN where participants are not told apart).
         points: ``predictor, control, fraction, difference, low, high, p``: H1 at every fraction observed.
-        treatment: Whose people should be predicted better.
-        controls: Than whose.
+        treatment: The condition in which goals should be predicted better.
+        controls: The conditions to beat.
         unit: What counted as independent.
         alpha: Level of the tests.
         share: Of the training data, that H3 takes of the treatment.
@@ -82,33 +83,31 @@ class Hypotheses:
 
     def words(self) -> str:
         """The verdicts in sentences."""
-        verdicts, lines = self.verdicts().set_index("hypothesis"), []
-        for name, statement in HYPOTHESES.items():
-            part = self.tests[self.tests["hypothesis"] == name]
-            if not len(part):
-                lines.append(f"{name}: {statement} Not tested.")
-                continue
-            row = verdicts.loc[name].drop("every predictor")
-            against = [str(predictor) for predictor, said in row.items() if said == "not supported"]
-            tested = sum(said != "–" for said in row)
-            gains = part["difference"]
-            lines.append(
-                f"{name}: {statement} {self.treatment} against {' and '.join(self.controls)}: supported for "
-                f"{tested - len(against)} of {tested} predictors"
-                + (f" (not for {', '.join(against)})" if against else ": whoever predicts")
-                + f"; differences {gains.min():+.3f} to {gains.max():+.3f}, Hedges' g between {self.unit}s "
-                f"{part['g_units'].min():.2f} to {part['g_units'].max():.2f}{_of_people(part)}."
-            )
-        return "\n\n".join(lines)
+        found = [self._figures(name, statement) for name, statement in HYPOTHESES.items()]
+        controls = list(self.controls)
+        return narrate("verdicts", hypotheses=found, treatment=self.treatment, controls=controls, unit=self.unit)
+
+    def _figures(self, name: str, statement: str) -> dict[str, Any]:
+        """What a sentence about one hypothesis tells; ``tested`` is 0 where nothing was tested."""
+        part = self.tests[self.tests["hypothesis"] == name]
+        row = self.verdicts().set_index("hypothesis").loc[name].drop("every predictor")
+        return {
+            "name": name,
+            "statement": statement,
+            "tested": sum(said != "–" for said in row),
+            "against": [str(predictor) for predictor, said in row.items() if said == "not supported"],
+            "difference": _range(part["difference"]),
+            "between_units": _range(part["g_units"]),
+            "between_people": _range(part["g_people"].dropna()),
+        }
+
+
+def _range(values: pd.Series[float]) -> dict[str, float] | None:
+    return {"low": float(values.min()), "high": float(values.max())} if len(values) else None
 
 
 def _said(supported: bool) -> str:
     return "supported" if supported else "not supported"
-
-
-def _of_people(part: pd.DataFrame) -> str:
-    known = part["g_people"].dropna()
-    return f", between people {known.min():.2f} to {known.max():.2f}" if len(known) else ""
 
 
 def assess_hypotheses(
@@ -125,14 +124,14 @@ def assess_hypotheses(
 
     Args:
         rows: One per predictor, participant and fraction observed: ``predictor, condition, participant, fraction,
-            correct`` (mean over the participant's walks), and ``layout`` where a condition has several.
-        treatment: The condition whose people should be predicted better.
+            correct`` (mean over the participant's trajectories), and ``layout`` where a condition has several.
+        treatment: The condition in which goals should be predicted better.
         controls: The conditions to beat, each of them.
         curves: Learning curves: ``predictor, condition, share`` (of the training data, up to 1), ``accuracy``, and a
             column named after ``unit``. Without them H3 is not tested, nor for predictors that are not in them.
-        unit: What counts as independent. ``"layout"``: each layout's people are averaged first, so that what is found
-            holds for other layouts of the condition; exactly the nested analysis of variance. ``"participant"``: holds
-            for other people in these layouts alone. None: layouts if every condition has two or more.
+        unit: What counts as independent. ``"layout"``: each layout's participants are averaged first, so that what is
+            found holds for other layouts of the condition; exactly the nested analysis of variance. ``"participant"``:
+            holds for other participants in these layouts alone. None: layouts if every condition has two or more.
         share: Of the training data of the treatment in H3; the nearest one in ``curves`` is taken.
         alpha: Level of the tests.
 
@@ -187,14 +186,14 @@ def _unit_of(rows: pd.DataFrame) -> Unit:
 
 
 def _units(table: pd.DataFrame, unit: str) -> pd.DataFrame:
-    """The table with units as participants; layouts are numbered within conditions, people keep their names."""
+    """The table with units as participants; layouts are numbered within conditions, participants keep their names."""
     if unit == "participant":
         return table
     return table.assign(participant=table["condition"] + "/" + table[unit].astype(str))
 
 
 def _balanced(table: pd.DataFrame, unit: str, value: str) -> pd.DataFrame:
-    """One value per unit (and fraction), people of a layout counting equally."""
+    """One value per unit (and fraction), participants of a layout counting equally."""
     keys = ["condition", "participant", *(["fraction"] if "fraction" in table else [])]
     return _units(table, unit).groupby(keys, sort=False)[[value]].mean().reset_index()
 
@@ -203,17 +202,18 @@ def _pairs(
     part: pd.DataFrame, treatment: str, controls: Sequence[str], unit: str, alpha: float
 ) -> tuple[dict[str, dict[str, Any]], pd.DataFrame]:
     """The treatment against each control: the mean over fractions, and each fraction."""
-    from predictors.evaluation.statistics import compare_conditions
+    from predictors.evaluation.comparison import compare_conditions
+    from predictors.evaluation.statistics import hedges_g
 
     table = _balanced(part, unit, "correct")
     mean = compare_conditions(table, at="mean", alpha=alpha)
     each = compare_conditions(table, alpha=alpha)
-    people = {name: own.groupby("participant")["correct"].mean() for name, own in part.groupby("condition")}
+    participants = {name: own.groupby("participant")["correct"].mean() for name, own in part.groupby("condition")}
     rows = {}
     for control in controls:
         row = _oriented(mean.pairs, treatment, control).iloc[0]
         means = mean.means.set_index("condition")["mean"]
-        g = hedges_g(people[treatment].to_numpy(), people[control].to_numpy())
+        g = hedges_g(participants[treatment].to_numpy(), participants[control].to_numpy())
         rows[control] = _row(treatment, control, means, row, g, alpha)
     columns = ["fraction", "control", "difference", "low", "high", "p"]
     import pandas as pd
@@ -271,7 +271,7 @@ def _less_data(
     """The treatment with a share of its data against each control with all."""
     import pandas as pd
 
-    from predictors.evaluation.statistics import compare_conditions
+    from predictors.evaluation.comparison import compare_conditions
 
     some = part[(part["condition"] == treatment) & np.isclose(part["share"], share)]
     whole = part[part["condition"].isin(controls) & np.isclose(part["share"], part["share"].max())]
@@ -284,21 +284,6 @@ def _less_data(
         rows[control] = _row(treatment, control, means, pair, float("nan"), alpha)
         rows[control]["note"] = f"{share:.0%} of the data against all of it".replace("%", " %")
     return rows
-
-
-def hedges_g(a: npt.NDArray[np.float64], b: npt.NDArray[np.float64]) -> float:
-    """Difference of two means in units of their pooled spread, with Hedges' (1981) correction for small samples.
-
-    NaN where a sample has fewer than two values, infinite where nothing varies but means differ.
-    """
-    if min(len(a), len(b)) < 2:
-        return float("nan")
-    freedom = len(a) + len(b) - 2
-    pooled = np.sqrt((((a - a.mean()) ** 2).sum() + ((b - b.mean()) ** 2).sum()) / freedom)
-    difference = float(a.mean() - b.mean())
-    if pooled < 1e-12:
-        return 0.0 if abs(difference) < 1e-12 else float(np.copysign(np.inf, difference))
-    return difference / float(pooled) * (1 - 3 / (4 * freedom - 1))
 
 
 def reached_at(fractions: Sequence[float], accuracy: Sequence[float], level: float) -> float:

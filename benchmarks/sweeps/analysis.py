@@ -1,4 +1,4 @@
-"""Tables of a sweep, from the results of its cells alone."""
+"""Tables of a sweep, from the results of its trials alone."""
 
 from __future__ import annotations
 
@@ -6,25 +6,27 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from benchmarks.sweeps.sweep import Sweep
-from benchmarks.trials import CellStore
+from benchmarks.trials import TrialName, TrialStore
 from legible_envs.support.files import write_atomically
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["CELL_FUNCTION", "for_reading", "results", "summarise", "write_tables"]
+__all__ = ["SEARCH", "for_reading", "results", "summarise", "write_tables"]
 
-CELL_FUNCTION: Final = "benchmarks.sweeps.run:run_cell"
+SEARCH: Final = TrialName("sweep/search", ("benchmarks.sweeps.run:run_cell",))
+"""The name that results of single searches are kept under."""
+
 _SETTINGS: Final = ["workspace", "objective", "emitter", "evaluations"]
 _UNSUMMARISED: Final = {*_SETTINGS, "seed", "scored", "best_genome"}
 
 
 def results(sweep: Sweep, folder: str | Path) -> pd.DataFrame:
-    """A row per finished cell under its labels, in the order of the sweep; see :func:`benchmarks.sweeps.run_sweep`."""
+    """A row per finished trial under its labels, in the order of the sweep; as :func:`~benchmarks.sweeps.run_sweep`."""
     import pandas as pd
 
-    store = CellStore(folder, CELL_FUNCTION)
-    rows = [variant.labels | row for variant in sweep.variants() for row in store.load(variant.cell) or ()]
+    store = TrialStore(folder, SEARCH)
+    rows = [variant.labels | row for variant in sweep.variants() for row in store.load(variant.trial) or ()]
     return pd.DataFrame(rows, columns=None if rows else [*_SETTINGS, "seed"])
 
 

@@ -1,4 +1,4 @@
-"""Run a sweep: a search per cell, and how well predictors read people in what it found."""
+"""Run a sweep: a search per trial, and how well predictors predict goals in the best layout that it found."""
 
 from __future__ import annotations
 
@@ -9,14 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from benchmarks.sweeps.analysis import CELL_FUNCTION, write_tables
+from benchmarks.sweeps.analysis import SEARCH, write_tables
 from benchmarks.sweeps.sweep import Sweep
-from benchmarks.trials import CellsFailed, Event, run_cells
+from benchmarks.trials import Event, TrialsFailed, run_trials, trial_function
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["run_cell", "run_sweep"]
+    from legible_envs.workspace import Workspace
+
+__all__ = ["run_search", "run_sweep"]
 
 
 def run_sweep(
@@ -27,45 +29,46 @@ def run_sweep(
     scheduler: str | None = None,
     progress: Callable[[Event], object] | None = None,
 ) -> pd.DataFrame:
-    """Run every cell that has no result yet; write ``results.csv`` and ``summary.csv``.
+    """Run every trial that has no result yet; write ``results.csv`` and ``summary.csv``.
 
     Args:
         sweep: What to run.
-        folder: Where results are kept; see :func:`benchmarks.trials.run_cells`.
+        folder: Where results are kept; see :func:`benchmarks.trials.run_trials`.
         workers: Processes on this machine; all cores if None.
         scheduler: Address of a Dask scheduler instead.
         progress: Called whenever something changes.
 
     Returns:
-        A row per cell: its labels, then ``best`` (the objective's value of the best layout), ``legibility``,
+        A row per trial: its labels, then ``best`` (the objective's value of the best layout), ``legibility``,
         ``distance``, ``qd_score``, ``coverage``, ``scored`` (layouts), ``best_genome`` (JSON) and ``accuracy.NAME`` of
         every predictor.
 
     Raises:
-        CellsFailed: Some cells failed twice; both tables are written all the same.
+        TrialsFailed: Some trials failed twice; both tables are written all the same.
     """
-    cells = [variant.cell for variant in sweep.variants()]
+    trials = [variant.trial for variant in sweep.variants()]
     try:
-        run_cells(CELL_FUNCTION, cells, folder, workers=workers, scheduler=scheduler, progress=progress)
-    except CellsFailed as error:
-        raise CellsFailed(str(error), error.failures, write_tables(sweep, folder)) from error
+        run_trials(run_search, trials, folder, workers=workers, scheduler=scheduler, progress=progress)
+    except TrialsFailed as error:
+        raise TrialsFailed(str(error), error.failures, write_tables(sweep, folder)) from error
     return write_tables(sweep, folder)
 
 
-def run_cell(cell: dict[str, Any]) -> dict[str, Any]:
+@trial_function(SEARCH)
+def run_search(trial: dict[str, Any]) -> dict[str, Any]:
     """One search of a sweep."""
     from legible_envs.workspace import make_workspace
     from optimizers import search
 
-    workspace = make_workspace(cell["workspace"])
-    options = {name: value for name, value in cell["emitter"].items() if name != "emitter"}
+    workspace = make_workspace(trial["workspace"])
+    options = {name: value for name, value in trial["emitter"].items() if name != "emitter"}
     result = search(
         workspace,
-        objective=cell["objective"],
-        emitter=cell["emitter"]["emitter"],
+        objective=trial["objective"],
+        emitter=trial["emitter"]["emitter"],
         emitter_options=options or None,
-        evaluations=cell["evaluations"],
-        seed=cell["seed"],
+        evaluations=trial["evaluations"],
+        seed=trial["seed"],
         progress=False,
     )
     row: dict[str, Any] = {
@@ -81,20 +84,20 @@ def run_cell(cell: dict[str, Any]) -> dict[str, Any]:
         row["legibility"] = float(workspace.legibility(result.best_genome))
         row["distance"] = float(workspace.distance(result.best_genome))
         row["best_genome"] = json.dumps(result.best_genome.tolist())
-        row |= _read_people(workspace, result.best_genome, cell)
+        row |= _accuracies(workspace, result.best_genome, trial)
     return row
 
 
-def _read_people(workspace: Any, genome: Any, cell: Mapping[str, Any]) -> dict[str, float]:
-    """Mean accuracy over 10 to 90 % observed of each predictor on people simulated in the best layout."""
-    if not cell.get("predictors"):
+def _accuracies(workspace: Workspace, genome: np.ndarray[Any, Any], trial: Mapping[str, Any]) -> dict[str, float]:
+    """Mean accuracy over 10 to 90 % observed of each predictor on participants simulated in the best layout."""
+    if not trial.get("predictors"):
         return {}
     from predictors.evaluation.cross_validation import evaluate
 
-    settings = dict(cell["people"])
+    settings = dict(trial["people"])
     participants = int(settings.pop("participants", 8))
-    rng = np.random.default_rng(np.random.SeedSequence((cell["seed"], 1)))
-    walks = workspace.simulate(genome, participants, rng, **settings)
-    found = evaluate(list(cell["predictors"]), walks, rare="keep", seed=cell["seed"])
+    rng = np.random.default_rng(np.random.SeedSequence((trial["seed"], 1)))
+    trajectories = workspace.simulate(genome, participants, rng, **settings)
+    found = evaluate(list(trial["predictors"]), trajectories, rare="keep", seed=trial["seed"])
     means = found.table.groupby("predictor")["correct"].mean()
     return {f"accuracy.{name}": float(value) for name, value in means.items()}

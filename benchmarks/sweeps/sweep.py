@@ -1,4 +1,4 @@
-"""The file of a sweep, and the cells it stands for."""
+"""The file of a sweep, and the trials it stands for."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import numpy as np
 from legible_envs.workspace import ObjectiveName, Workspace, make_workspace
 from predictors.registry import make_predictor
 
-__all__ = ["Named", "Sweep", "SweepError", "Variant"]
+__all__ = ["Named", "Prediction", "Sweep", "SweepError", "Variant"]
 
 _KEYS: Final = ("name", "seeds", "evaluations", "objectives", "workspaces", "emitters", "predictors", "people")
 
@@ -32,18 +32,18 @@ class Named(NamedTuple):
     own: Mapping[str, Any] = MappingProxyType({})
 
 
-class Readers(NamedTuple):
-    """Who reads simulated people in the layouts found, and what these people are like."""
+class Prediction(NamedTuple):
+    """Which predictors are evaluated on simulated participants in the layouts found, and how these are simulated."""
 
     predictors: tuple[str, ...] = ()
     people: Mapping[str, Any] = MappingProxyType({})
 
 
 class Variant(NamedTuple):
-    """A cell and what tables call its settings."""
+    """A trial and what tables call its settings."""
 
     labels: dict[str, Any]
-    cell: dict[str, Any]
+    trial: dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -57,8 +57,9 @@ class Sweep:
         objectives: Names.
         evaluations: Budgets.
         seeds: One search each.
-        readers: By label of a workspace, who reads simulated people in the best layout of every search, and what these
-            people are: ``participants`` (8) and what the workspace's ``simulate`` takes.
+        prediction: By label of a workspace, the predictors evaluated on simulated participants in the best layout of
+            every search, and how these are simulated: ``participants`` (8) and what the workspace's ``simulate``
+            takes.
 
     Example:
         >>> sweep = Sweep.from_dict({"workspaces": [{"workspace": "overcooked", "shape": [5, 5]}], "seeds": 3})
@@ -72,7 +73,7 @@ class Sweep:
     objectives: tuple[str, ...]
     evaluations: tuple[int, ...]
     seeds: tuple[int, ...]
-    readers: Mapping[str, Readers]
+    prediction: Mapping[str, Prediction]
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Sweep:
@@ -104,7 +105,7 @@ class Sweep:
 
         Raises:
             SweepError: Unknown keys, unknown names, settings that a workspace or an emitter refuses, predictors that
-                cannot read the people of a workspace.
+                cannot predict the goals of the participants of a workspace.
         """
         unknown = sorted(set(data) - set(_KEYS))
         if unknown or not data.get("workspaces"):
@@ -122,13 +123,13 @@ class Sweep:
             objectives=tuple(_listed(data.get("objectives", ["legibility"]), str, "objectives")),
             evaluations=tuple(_listed(data.get("evaluations", [100_000]), int, "evaluations")),
             seeds=tuple(range(seeds)) if type(seeds) is int else tuple(_listed(seeds, int, "seeds")),
-            readers={named.label: _readers(shared | dict(named.own)) for named in workspaces},
+            prediction={named.label: _prediction(shared | dict(named.own)) for named in workspaces},
         )
         sweep._check()
         return sweep
 
     def variants(self) -> Iterator[Variant]:
-        """All cells, seeds fastest."""
+        """All trials, seeds fastest."""
         axes = (self.workspaces, self.objectives, self.emitters, self.evaluations, self.seeds)
         for workspace, objective, emitter, evaluations, seed in itertools.product(*axes):
             labels = {
@@ -138,17 +139,17 @@ class Sweep:
                 "evaluations": evaluations,
                 "seed": seed,
             }
-            cell: dict[str, Any] = {
+            trial: dict[str, Any] = {
                 "workspace": workspace.settings,
                 "objective": objective,
                 "emitter": emitter.settings,
                 "evaluations": evaluations,
                 "seed": seed,
             }
-            predictors, people = self.readers[workspace.label]
+            predictors, people = self.prediction[workspace.label]
             if predictors:
-                cell |= {"predictors": list(predictors), "people": dict(people)}
-            yield Variant(labels, cell)
+                trial |= {"predictors": list(predictors), "people": dict(people)}
+            yield Variant(labels, trial)
 
     def _check(self) -> None:
         from optimizers import make_archive, make_emitter
@@ -173,21 +174,21 @@ class Sweep:
                     )
             except (ValueError, TypeError) as error:
                 raise SweepError(f"workspace {named.label!r}: {error}") from error
-            self._check_readers(named.label, workspace)
+            self._check_prediction(named.label, workspace)
 
-    def _check_readers(self, label: str, workspace: Workspace) -> None:
-        """Let every predictor read one person in one random layout."""
-        predictors, people = self.readers[label]
+    def _check_prediction(self, label: str, workspace: Workspace) -> None:
+        """Let every predictor predict the goals of one participant in one random layout."""
+        predictors, people = self.prediction[label]
         if not predictors:
             return
         rng = np.random.default_rng(0)
         genome, settings = workspace.sample(1, rng)[0], _without(people, "participants")
-        walks = _try(f"people of workspace {label!r}", lambda: workspace.simulate(genome, 1, rng, **settings))
+        trajectories = _try(f"people of workspace {label!r}", lambda: workspace.simulate(genome, 1, rng, **settings))
         for name in predictors:
             predictor = _try(f"predictor {name!r}", lambda name=name: make_predictor(name))
             _try(
                 f"predictor {name!r}, people of workspace {label!r} (which may have `predictors` of its own)",
-                lambda it=predictor: it.fit(walks).predict_proba(walks[:1]),
+                lambda it=predictor: it.fit(trajectories).predict_proba(trajectories[:1]),
             )
 
 
@@ -202,16 +203,18 @@ def _without(settings: Mapping[str, Any], key: str) -> dict[str, Any]:
     return {name: value for name, value in settings.items() if name != key}
 
 
-def _readers(data: Mapping[str, Any]) -> Readers:
+def _prediction(data: Mapping[str, Any]) -> Prediction:
     if not isinstance(data["people"], Mapping):
         raise SweepError(f"`people` must be a table, got {data['people']!r}")
-    return Readers(tuple(_listed(data["predictors"], str, "predictors")), dict(data["people"]))
+    return Prediction(tuple(_listed(data["predictors"], str, "predictors")), dict(data["people"]))
 
 
 def _axis(entries: Any, key: str, own: Sequence[str] = ()) -> tuple[Named, ...]:
     """Entries of an axis: names or mappings, labelled so that tables can tell them apart; ``own`` are no settings."""
     found = []
-    for number, entry in enumerate([entries] if isinstance(entries, str | Mapping) else list(entries), 1):
+    if not isinstance(entries, str | Mapping | list | tuple):
+        raise SweepError(f"`{key}s` must be a name, a table or a list of these, got {entries!r}")
+    for number, entry in enumerate([entries] if isinstance(entries, str | Mapping) else entries, 1):
         settings = {key: entry} if isinstance(entry, str) else dict(entry) if isinstance(entry, Mapping) else {}
         if not isinstance(settings.get(key), str):
             raise SweepError(

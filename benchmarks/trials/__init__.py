@@ -1,10 +1,11 @@
-"""Experiments as cells: one setting and seed each, run once, on any number of processes or machines.
+"""Experiments as trials: one setting and seed each, run once, on any number of processes or machines.
 
-A *cell* is a mapping that JSON can hold. Its function turns it into result rows; these are written the moment the cell
-ends, so that an interrupted experiment goes on where it stopped.
+A *trial* is a mapping that JSON can hold. Its function turns it into result rows; these are written the moment the
+trial ends, so that an interrupted experiment goes on where it stopped.
 """
 
-from benchmarks.trials.running import CellsFailed, Event, run_cells
-from benchmarks.trials.store import CellStore
+from benchmarks.trials.functions import TrialName, trial_function
+from benchmarks.trials.running import Event, TrialsFailed, run_trials
+from benchmarks.trials.store import TrialStore
 
-__all__ = ["CellStore", "CellsFailed", "Event", "run_cells"]
+__all__ = ["Event", "TrialName", "TrialStore", "TrialsFailed", "run_trials", "trial_function"]

@@ -1,4 +1,4 @@
-"""Cells on a Dask cluster."""
+"""Trials on a Dask cluster."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from benchmarks.trials.running import Outcome, run_one
-from benchmarks.trials.store import Cell
+from benchmarks.trials.store import Trial
 from optimizers.evaluator import connect
 
 __all__ = ["ClusterPool"]
@@ -16,17 +16,17 @@ _POLL = 0.5
 """Seconds after which progress per worker is asked for again."""
 
 
-def run_here(function: str, number: int, cell: Cell) -> Outcome:
+def run_here(function: str, number: int, trial: Trial) -> Outcome:
     """One attempt, on a worker of a cluster."""
     from distributed import get_worker
 
-    return run_one(function, number, cell, str(get_worker().address))
+    return run_one(function, number, trial, str(get_worker().address))
 
 
 class ClusterPool:
-    """Runs cells on the workers of a Dask scheduler, one per thread.
+    """Runs trials on the workers of a Dask scheduler, one per thread.
 
-    A lost worker's cells are run elsewhere; results come back to this process, the only one that writes.
+    A lost worker's trials are run elsewhere; results come back to this process, the only one that writes.
 
     Args:
         scheduler: Its address.
@@ -34,14 +34,14 @@ class ClusterPool:
 
     def __init__(self, scheduler: str) -> None:
         self._client = connect(scheduler)
-        self._queue: deque[tuple[int, Cell]] = deque()
+        self._queue: deque[tuple[int, Trial]] = deque()
 
-    def run(self, function: str, cells: Iterator[tuple[int, Cell]]) -> Iterator[Outcome | dict[str, Cell]]:
+    def run(self, function: str, trials: Iterator[tuple[int, Trial]]) -> Iterator[Outcome | dict[str, Trial]]:
         """See :class:`~benchmarks.trials.running.Pool`."""
         from distributed import wait
 
-        self._queue.extend(cells)
-        running: dict[Any, tuple[int, Cell]] = {}
+        self._queue.extend(trials)
+        running: dict[Any, tuple[int, Trial]] = {}
         try:
             while self._queue or running:
                 self._submit(function, running)
@@ -59,25 +59,25 @@ class ClusterPool:
             self._client.cancel(list(running))
             self._client.close()
 
-    def again(self, number: int, cell: Cell) -> None:
+    def again(self, number: int, trial: Trial) -> None:
         """See :class:`~benchmarks.trials.running.Pool`."""
-        self._queue.append((number, cell))
+        self._queue.append((number, trial))
 
-    def _submit(self, function: str, running: dict[Any, tuple[int, Cell]]) -> None:
-        """A cell per thread, no more: what is not submitted cannot be lost, nor be stuck behind a slow worker."""
+    def _submit(self, function: str, running: dict[Any, tuple[int, Trial]]) -> None:
+        """A trial per thread, no more: what is not submitted cannot be lost, nor be stuck behind a slow worker."""
         room = max(1, sum(self._client.nthreads().values())) - len(running)
         while self._queue and room > 0:
-            number, cell = self._queue.popleft()
-            running[self._client.submit(run_here, function, number, dict(cell), pure=False)] = (number, cell)
+            number, trial = self._queue.popleft()
+            running[self._client.submit(run_here, function, number, dict(trial), pure=False)] = (number, trial)
             room -= 1
 
-    def _working(self, running: dict[Any, tuple[int, Cell]]) -> dict[str, Cell]:
-        """What each worker is at: the first cell it was given and has not ended."""
-        cells = {future.key: cell for future, (_, cell) in running.items()}
+    def _working(self, running: dict[Any, tuple[int, Trial]]) -> dict[str, Trial]:
+        """What each worker is at: the first trial it was given and has not ended."""
+        trials = {future.key: trial for future, (_, trial) in running.items()}
         return {
-            worker: next(cells[key] for key in keys if key in cells)
+            worker: next(trials[key] for key in keys if key in trials)
             for worker, keys in self._client.processing().items()
-            if any(key in cells for key in keys)
+            if any(key in trials for key in keys)
         }
 
 

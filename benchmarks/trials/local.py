@@ -1,4 +1,4 @@
-"""Cells on this machine: one process per core, each with its own fate."""
+"""Trials on this machine: one process per core, each with its own fate."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 
 from benchmarks.trials.running import Outcome, run_one
-from benchmarks.trials.store import Cell
+from benchmarks.trials.store import Trial
 
 __all__ = ["InProcess", "LocalPool", "num_cores"]
 
@@ -21,51 +21,51 @@ def num_cores() -> int:
 
 
 class InProcess:
-    """Runs cells one after the other in this process."""
+    """Runs trials one after the other in this process."""
 
     def __init__(self) -> None:
-        self._queue: deque[tuple[int, Cell]] = deque()
+        self._queue: deque[tuple[int, Trial]] = deque()
 
-    def run(self, function: str, cells: Iterator[tuple[int, Cell]]) -> Iterator[Outcome | dict[str, Cell]]:
+    def run(self, function: str, trials: Iterator[tuple[int, Trial]]) -> Iterator[Outcome | dict[str, Trial]]:
         """See :class:`~benchmarks.trials.running.Pool`."""
-        self._queue.extend(cells)
+        self._queue.extend(trials)
         while self._queue:
-            number, cell = self._queue.popleft()
-            yield {"this process": cell}
-            yield run_one(function, number, cell, "this process")
+            number, trial = self._queue.popleft()
+            yield {"this process": trial}
+            yield run_one(function, number, trial, "this process")
         yield {}
 
-    def again(self, number: int, cell: Cell) -> None:
+    def again(self, number: int, trial: Trial) -> None:
         """See :class:`~benchmarks.trials.running.Pool`."""
-        self._queue.append((number, cell))
+        self._queue.append((number, trial))
 
 
 class LocalPool:
-    """Runs cells in processes of this machine.
+    """Runs trials in processes of this machine.
 
-    Every worker is an executor of its own: one that dies (killed, out of memory) takes only its running cell along, and
-    is replaced.
+    Every worker is an executor of its own: one that dies (killed, out of memory) takes only its running trial along,
+    and is replaced.
 
     Args:
         workers: Number of processes.
     """
 
     def __init__(self, workers: int) -> None:
-        self._queue: deque[tuple[int, Cell]] = deque()
+        self._queue: deque[tuple[int, Trial]] = deque()
         self._executors = {f"process {i + 1}": _executor() for i in range(workers)}
 
-    def run(self, function: str, cells: Iterator[tuple[int, Cell]]) -> Iterator[Outcome | dict[str, Cell]]:
+    def run(self, function: str, trials: Iterator[tuple[int, Trial]]) -> Iterator[Outcome | dict[str, Trial]]:
         """See :class:`~benchmarks.trials.running.Pool`."""
-        self._queue.extend(cells)
-        running: dict[Future[Outcome], tuple[str, int, Cell]] = {}
+        self._queue.extend(trials)
+        running: dict[Future[Outcome], tuple[str, int, Trial]] = {}
         try:
             while True:
                 idle = [name for name in self._executors if name not in {worker for worker, _, _ in running.values()}]
                 while idle and self._queue:
-                    worker, (number, cell) = idle.pop(0), self._queue.popleft()
-                    future = self._executors[worker].submit(run_one, function, number, cell, worker)
-                    running[future] = (worker, number, cell)
-                yield {worker: cell for worker, _, cell in running.values()}
+                    worker, (number, trial) = idle.pop(0), self._queue.popleft()
+                    future = self._executors[worker].submit(run_one, function, number, trial, worker)
+                    running[future] = (worker, number, trial)
+                yield {worker: trial for worker, _, trial in running.values()}
                 if not running:
                     return
                 for future in wait(running, return_when=FIRST_COMPLETED).done:
@@ -74,9 +74,9 @@ class LocalPool:
         finally:
             self._stop()
 
-    def again(self, number: int, cell: Cell) -> None:
+    def again(self, number: int, trial: Trial) -> None:
         """See :class:`~benchmarks.trials.running.Pool`."""
-        self._queue.append((number, cell))
+        self._queue.append((number, trial))
 
     def _outcome(self, future: Future[Outcome], worker: str, number: int) -> Outcome:
         try:
@@ -87,7 +87,7 @@ class LocalPool:
             return Outcome(number, None, f"the worker was lost: {error}", 0.0, worker)
 
     def _stop(self) -> None:
-        """End at once, also in the middle of cells: their results would be thrown away."""
+        """End at once, also in the middle of trials: their results would be thrown away."""
         for executor in self._executors.values():
             processes = list((getattr(executor, "_processes", None) or {}).values())
             executor.shutdown(wait=False, cancel_futures=True)

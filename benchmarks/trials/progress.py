@@ -1,4 +1,4 @@
-"""Progress of many cells on a terminal: the whole, and what each worker is at."""
+"""Progress of many trials on a terminal: the whole, and what each worker is at."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from types import TracebackType
 from typing import Any
 
 from benchmarks.trials.running import Event
-from benchmarks.trials.store import Cell
+from benchmarks.trials.store import Trial
 
-__all__ = ["CellsProgress"]
+__all__ = ["TrialsProgress"]
 
 _MAX_WORKERS = 12
 _WIDTH = 72
 
 
-class CellsProgress:
+class TrialsProgress:
     """A progress bar on standard error with a line per worker.
 
     Args:
@@ -28,7 +28,7 @@ class CellsProgress:
         self._live: Any = None
         self._task: Any = None
 
-    def __enter__(self) -> CellsProgress:
+    def __enter__(self) -> TrialsProgress:
         if self._shown:
             from rich.console import Console
             from rich.live import Live
@@ -40,7 +40,7 @@ class CellsProgress:
                 TextColumn("{task.fields[status]}"),
                 TimeRemainingColumn(compact=True),
             )
-            self._task = self._bar.add_task("cells", total=None, status="")
+            self._task = self._bar.add_task("trials", total=None, status="")
             self._live = Live(self._bar, console=Console(stderr=True), refresh_per_second=4)
             self._live.start()
         return self
@@ -62,15 +62,15 @@ class CellsProgress:
         status = " · ".join(f"{count} {what}" for what, count in counts.items() if count)
         self._bar.update(self._task, total=event.total, completed=event.done + event.failed, status=status)
         workers = sorted(event.running.items())
-        lines = [Text(f"  {worker}: {describe(cell)}", style="dim") for worker, cell in workers[:_MAX_WORKERS]]
+        lines = [Text(f"  {worker}: {describe(trial)}", style="dim") for worker, trial in workers[:_MAX_WORKERS]]
         if len(workers) > _MAX_WORKERS:
             lines.append(Text(f"  … and {len(workers) - _MAX_WORKERS} more workers", style="dim"))
         self._live.update(Group(self._bar, *lines))
 
 
-def describe(cell: Cell) -> str:
-    """A cell in a line: its plain values, one after the other."""
-    text = " ".join(f"{key}={_short(value)}" for key, value in cell.items())
+def describe(trial: Trial) -> str:
+    """A trial in a line: its plain values, one after the other."""
+    text = " ".join(f"{key}={_short(value)}" for key, value in trial.items())
     return text if len(text) <= _WIDTH else text[: _WIDTH - 1] + "…"
 
 

@@ -1,8 +1,7 @@
-"""Run cells on this machine's cores or on a Dask cluster; each once, retried once, none lost."""
+"""Run trials on this machine's cores or on a Dask cluster; each once, retried once, none lost."""
 
 from __future__ import annotations
 
-import importlib
 import time
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -10,25 +9,26 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol
 
-from benchmarks.trials.store import Cell, CellStore, Rows, plain
+from benchmarks.trials.functions import name_of, path_of, resolve
+from benchmarks.trials.store import Rows, Trial, TrialStore, plain
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["CellsFailed", "Event", "Outcome", "Pool", "run_cells", "run_one"]
+__all__ = ["Event", "Outcome", "Pool", "TrialsFailed", "run_one", "run_trials"]
 
 ATTEMPTS: Final = 2
 
 
 class Outcome(NamedTuple):
-    """How one attempt at a cell ended; either ``rows`` or ``error`` is set.
+    """How one attempt at a trial ended; either ``rows`` or ``error`` is set.
 
     Attributes:
-        number: Index of the cell.
+        number: Index of the trial.
         rows: Its result rows.
         error: Its traceback, or how its worker was lost.
         seconds: How long it took.
-        worker: Who ran it.
+        worker: Which worker ran it.
     """
 
     number: int
@@ -43,12 +43,12 @@ class Event:
     """Where an experiment stands; handed to ``progress`` whenever something changes.
 
     Attributes:
-        total: Number of cells.
+        total: Number of trials.
         done: Finished ones, those found on disk included.
         found: Those found on disk.
-        failed: Cells given up.
+        failed: Trials given up.
         retried: Attempts that failed and were repeated.
-        running: What each worker is at: its name and the cell.
+        running: What each worker is at: its name and the trial.
         last: The newest outcome, if any.
     """
 
@@ -57,16 +57,16 @@ class Event:
     found: int = 0
     failed: int = 0
     retried: int = 0
-    running: dict[str, Cell] = field(default_factory=dict)
+    running: dict[str, Trial] = field(default_factory=dict)
     last: Outcome | None = None
 
 
-class CellsFailed(RuntimeError):
-    """Some cells failed twice; everything else is finished and on disk.
+class TrialsFailed(RuntimeError):
+    """Some trials failed twice; everything else is finished and on disk.
 
     Attributes:
-        failures: What :meth:`CellStore.failures` says of each.
-        table: Rows of the finished cells.
+        failures: What :meth:`TrialStore.failures` says of each.
+        table: Rows of the finished trials.
     """
 
     def __init__(self, message: str, failures: list[dict[str, Any]], table: pd.DataFrame) -> None:
@@ -76,34 +76,36 @@ class CellsFailed(RuntimeError):
 
 
 class Pool(Protocol):
-    """Whoever runs cells: takes them one by one, gives outcomes as they come."""
+    """What runs trials: it takes them one by one and yields outcomes as they come."""
 
-    def run(self, function: str, cells: Iterator[tuple[int, Cell]]) -> Iterator[Outcome | dict[str, Cell]]:
-        """Outcomes in any order; between them, mappings of worker to cell whenever that changes."""
+    def run(self, function: str, trials: Iterator[tuple[int, Trial]]) -> Iterator[Outcome | dict[str, Trial]]:
+        """Outcomes in any order; between them, mappings of worker to trial whenever that changes."""
 
-    def again(self, number: int, cell: Cell) -> None:
-        """Put a cell back at the end of the queue."""
+    def again(self, number: int, trial: Trial) -> None:
+        """Put a trial back at the end of the queue."""
 
 
-def run_cells(
+def run_trials(
     function: Callable[[dict[str, Any]], Any] | str,
-    cells: Iterable[Cell],
+    trials: Iterable[Trial],
     folder: str | Path,
     *,
     workers: int | None = None,
     scheduler: str | None = None,
     progress: Callable[[Event], object] | None = None,
 ) -> pd.DataFrame:
-    """Run a function over cells and keep every result.
+    """Run a function over trials and keep every result.
 
-    The table depends on the cells alone: not on how many workers ran them, in which order they ended, or how often the
+    The table depends on the trials alone: not on how many workers ran them, in which order they ended, or how often the
     run was interrupted.
 
     Args:
-        function: Takes a cell, returns a mapping or a list of mappings (result rows); defined at the top of a module
+        function: Takes a trial, returns a mapping or a list of mappings (result rows); defined at the top of a module
             that workers can import, or its ``"module:name"``.
-        cells: Settings and seed, one mapping of plain data each; equal ones are run once.
-        folder: Where results are kept. Cells that have a result there are not run again; cells that failed are.
+        trials: Settings and seed, one mapping of plain data each; equal ones are run once.
+        folder: Where results are kept. Trials that have a result there are not run again; trials that failed are. A
+            result belongs to its trial and to the name of the function (see :func:`.trial_function`), which is its path
+            unless it was given one.
         workers: Processes on this machine; all cores if None; 1 runs everything in this process. A script of your own
             that starts several needs the usual ``if __name__ == "__main__":``.
         scheduler: Address of a Dask scheduler, such as ``"tcp://10.0.0.1:8786"``, whose workers can import
@@ -111,28 +113,28 @@ def run_cells(
         progress: Called with an :class:`Event` whenever something changes.
 
     Returns:
-        A row per result row, in the order of ``cells``, its cell's settings as leading columns.
+        A row per result row, in the order of ``trials``, its trial's settings as leading columns.
 
     Raises:
-        CellsFailed: Some cells failed twice. Raised at the end, when all others are finished.
-        ValueError: A cell that JSON cannot hold, or a function that workers cannot find.
+        TrialsFailed: Some trials failed twice. Raised at the end, when all others are finished.
+        ValueError: A trial that JSON cannot hold, or a function that workers cannot find.
     """
-    path = _path_of(function)
-    store = CellStore(folder, path)
-    unique = list({store.key(cell): dict(cell) for cell in cells}.values())
-    waiting = [(i, cell) for i, cell in enumerate(unique) if store.load(cell) is None]
+    path = path_of(function)
+    store = TrialStore(folder, name_of(path))
+    unique = list({store.key(trial): dict(trial) for trial in trials}.values())
+    waiting = [(i, trial) for i, trial in enumerate(unique) if store.load(trial) is None]
     event = Event(total=len(unique), done=len(unique) - len(waiting), found=len(unique) - len(waiting))
     report = progress or (lambda event: None)
     report(event)
     if waiting:
         _run(_pool(workers, scheduler, len(waiting)), path, unique, waiting, store, event, report)
     table = store.table(unique)
-    keys = {store.key(cell) for cell in unique}
+    keys = {store.key(trial) for trial in unique}
     failures = [failure for failure in store.failures() if store.key(failure["cell"]) in keys]
     if event.failed:
         last = failures[-1]["traceback"].strip().splitlines()[-1]
-        raise CellsFailed(
-            f"{event.failed} of {event.total} cells failed {ATTEMPTS} times; the others are finished. Tracebacks: "
+        raise TrialsFailed(
+            f"{event.failed} of {event.total} trials failed {ATTEMPTS} times; the others are finished. Tracebacks: "
             f"{store.folder / 'failed'}. The last: {last}",
             failures,
             table,
@@ -143,9 +145,9 @@ def run_cells(
 def _run(
     pool: Pool,
     function: str,
-    cells: Sequence[Cell],
-    waiting: Sequence[tuple[int, Cell]],
-    store: CellStore,
+    trials: Sequence[Trial],
+    waiting: Sequence[tuple[int, Trial]],
+    store: TrialStore,
     event: Event,
     report: Callable[[Event], object],
 ) -> None:
@@ -155,23 +157,23 @@ def _run(
             event.running = news
             report(event)
             continue
-        cell = cells[news.number]
+        trial = trials[news.number]
         event.last = news
         if news.rows is not None:
-            store.save(cell, news.rows, news.seconds, news.worker)
+            store.save(trial, news.rows, news.seconds, news.worker)
             event.done += 1
         else:
             attempts[news.number] = attempts.get(news.number, 0) + 1
-            store.save_failure(cell, news.error or "", attempts[news.number], news.worker)
+            store.save_failure(trial, news.error or "", attempts[news.number], news.worker)
             if attempts[news.number] < ATTEMPTS:
                 event.retried += 1
-                pool.again(news.number, cell)
+                pool.again(news.number, trial)
             else:
                 event.failed += 1
         report(event)
 
 
-def _pool(workers: int | None, scheduler: str | None, num_cells: int) -> Pool:
+def _pool(workers: int | None, scheduler: str | None, num_trials: int) -> Pool:
     if scheduler is not None:
         from benchmarks.trials.cluster import ClusterPool
 
@@ -181,34 +183,15 @@ def _pool(workers: int | None, scheduler: str | None, num_cells: int) -> Pool:
     count = num_cores() if workers is None else workers
     if count < 1:
         raise ValueError(f"workers must be at least 1, got {workers}")
-    return InProcess() if count == 1 else LocalPool(min(count, num_cells))
+    return InProcess() if count == 1 else LocalPool(min(count, num_trials))
 
 
-def run_one(function: str, number: int, cell: Cell, worker: str) -> Outcome:
-    """One attempt at one cell, in the process that calls this."""
+def run_one(function: str, number: int, trial: Trial, worker: str) -> Outcome:
+    """One attempt at one trial, in the process that calls this."""
     started = time.perf_counter()
     rows, error = None, None
     try:
-        rows = plain(_resolve(function)(dict(cell)))
+        rows = plain(resolve(function)(dict(trial)))
     except Exception:
         error = traceback.format_exc()
     return Outcome(number, rows, error, time.perf_counter() - started, worker)
-
-
-def _resolve(path: str) -> Callable[[dict[str, Any]], Any]:
-    module, _, name = path.partition(":")
-    return getattr(importlib.import_module(module), name)
-
-
-def _path_of(function: Callable[[dict[str, Any]], Any] | str) -> str:
-    if isinstance(function, str):
-        path = function
-    else:
-        path = f"{getattr(function, '__module__', None)}:{getattr(function, '__qualname__', None)}"
-    try:
-        found = _resolve(path)
-    except (ImportError, AttributeError, ValueError) as error:
-        raise ValueError(f"workers cannot find {path!r}; give a function at the top of a module ({error})") from error
-    if not callable(found):
-        raise ValueError(f"{path!r} is {type(found).__name__}, not a function")
-    return path

@@ -1,6 +1,6 @@
+from .comparison import Comparison, compare_conditions
 from .cross_validation import accuracy_at, evaluate, learning_curve
 from .results import Evaluation, LearningCurve
-from .statistics import Comparison, compare_conditions
 
 __all__ = [
     "Comparison",

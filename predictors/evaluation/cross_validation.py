@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import CUTS, Cut, Trajectory
 from predictors.base import FRACTIONS, GoalPredictor, TieCredit, correctness
+from predictors.evaluation.comparison import Comparison, compare_conditions
 from predictors.evaluation.metrics import tied_shares
 from predictors.evaluation.results import Evaluation, LearningCurve
-from predictors.evaluation.splits import Groups, check_learnable, folds, nested_training_sets
-from predictors.evaluation.statistics import Comparison, compare_conditions
+from predictors.evaluation.splits import Groups, Split, check_learnable, folds, nested_training_sets
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -31,6 +31,9 @@ __all__ = [
 Spec = str | GoalPredictor | Callable[..., GoalPredictor]
 Specs = Spec | Sequence[Spec] | Mapping[str, Spec]
 Part = Literal["condition", "layout"]
+
+_REDRAWS: Final = 1000
+"""How many splits are drawn to find those whose smallest training set mentions every goal."""
 
 
 def accuracy_at(
@@ -269,6 +272,7 @@ def learning_curve(
     cut: Cut = "steps",
     ties: TieCredit = "fractional",
     groups: Groups | None = None,
+    rare: Literal["error", "redraw"] = "error",
     seed: int | np.random.Generator = 0,
 ) -> LearningCurve:
     """How accuracy grows with the number of trajectories learned from.
@@ -287,11 +291,13 @@ def learning_curve(
         cut: What the fraction is a share of, a key of :data:`legible_envs.rollouts.CUTS`.
         ties: As for :func:`evaluate`.
         groups: As for :func:`evaluate`.
+        rare: ``"error"`` refuses splits whose smallest training set never mentions a goal that is held out;
+            ``"redraw"`` draws splits until it mentions every goal (without groups only).
         seed: Of the splits.
 
     Raises:
         ValueError: Sizes that are no sizes or larger than what is left to learn from; goals that the smallest training
-            set does not mention; and as for :func:`evaluate`.
+            set does not mention, nor hardly any other split would; and as for :func:`evaluate`.
     """
     import pandas as pd
     from sklearn.base import clone
@@ -302,7 +308,7 @@ def learning_curve(
     named = _named(predictors)
     rng = np.random.default_rng(seed)
     rows = []
-    splits = [nested_training_sets(trajectories, test_share, rng, groups) for _ in range(repeats)]
+    splits = _splits(trajectories, sizes, test_share, repeats, rng, groups, rare)
     # Groups are of different sizes: the smallest pool decides, so that every repeat has the same training sizes.
     counts = _sizes(sizes, min(len(pool) for pool, _ in splits))
     for repeat, (pool, test) in enumerate(splits):
@@ -318,6 +324,37 @@ def learning_curve(
                     rows.append((name, repeat, size, len(held_out), float(fraction), float(accuracy)))
     columns = ["predictor", "repeat", "size", "judged", "fraction", "accuracy"]
     return LearningCurve(pd.DataFrame(rows, columns=columns), cut, ties, trajectories[0].candidate_set, test_share)
+
+
+def _splits(
+    trajectories: Sequence[Trajectory],
+    sizes: Sequence[int | float],
+    test_share: float,
+    repeats: int,
+    rng: np.random.Generator,
+    groups: Groups | None,
+    rare: str,
+) -> list[Split]:
+    """Pools to learn from and test sets, one pair per repeat."""
+    if rare == "error":
+        return [nested_training_sets(trajectories, test_share, rng, groups) for _ in range(repeats)]
+    if rare != "redraw":
+        raise ValueError(f"`rare` must be 'error' or 'redraw', got {rare!r}")
+    if groups is not None:
+        raise ValueError("rare='redraw' draws splits of single trajectories; use groups=None")
+    names = {name for trajectory in trajectories for name in trajectory.candidates}
+    found: list[Split] = []
+    for seed in rng.integers(2**31, size=_REDRAWS).tolist():
+        pool, test = nested_training_sets(trajectories, test_share, np.random.default_rng(seed))
+        least = _sizes(sizes, len(pool))[0]
+        if {name for i in pool[:least] for name in trajectories[i].candidates} == names:
+            found.append((pool, test))
+        if len(found) == repeats:
+            return found
+    raise ValueError(
+        f"in only {len(found)} of {_REDRAWS} splits the {least} trajectories learned from mention every goal; "
+        f"{repeats} are needed: begin with a larger size"
+    )
 
 
 def _sizes(sizes: Sequence[int | float], available: int) -> list[int]:

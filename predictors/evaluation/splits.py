@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import Trajectory
 
-__all__ = ["Groups", "check_learnable", "folds", "nested_training_sets"]
+__all__ = ["Groups", "Split", "check_learnable", "folds", "nested_training_sets"]
 
 Groups = Literal["participant"]
 Split = tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]

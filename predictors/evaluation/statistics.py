@@ -1,286 +1,67 @@
-"""Whether conditions or predictors differ: analysis of variance, Tukey's test, effect sizes.
+"""Tests of significance and effect sizes of samples: arrays in, numbers out.
 
-What is tested are *units* that are independent of one another. Folds of one cross-validation share their data: with
-4 folds x 3 repeats as units, a true null hypothesis is rejected about every second time. The default unit is therefore
-the participant, whose values are averaged first.
+A thin layer over :mod:`scipy.stats`, which gives the distributions; what is added is the analysis of variance with its
+error term (for Tukey's bands), repeated measures, and a stated answer where nothing varies. See
+``docs/decisions/0002-statistics.md``. For tables of values, see :func:`predictors.evaluation.compare_conditions`.
 """
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 from functools import lru_cache
-from itertools import combinations
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-if TYPE_CHECKING:
-    import pandas as pd
+__all__ = [
+    "Anova",
+    "effect_sizes",
+    "hedges_g",
+    "holm",
+    "one_way_anova",
+    "repeated_measures_anova",
+    "tukey_half_width",
+    "tukey_pair",
+]
 
-    from predictors.evaluation.results import Evaluation
-
-__all__ = ["Comparison", "compare_conditions", "holm", "tukey_half_width"]
-
-Unit = Literal["participant", "trajectory", "fold"]
-Design = Literal["auto", "between", "within"]
 Values = npt.NDArray[np.float64]
 
-_NO_VARIANCE = 1e-12
-"""Mean squares below this are zero: values are accuracies in [0, 1], and what is left is rounding."""
+NO_VARIANCE: Final = 1e-12
+"""Mean squares below this are zero: values are accuracies in [0, 1] or of that order, and what is left is rounding."""
 
 
-@dataclass(frozen=True, eq=False)
-class Comparison:
-    """What :func:`compare_conditions` found. Tables have a row per fraction (and level, and pair).
+class Anova(NamedTuple):
+    """An analysis of variance.
 
     Attributes:
-        anova: ``fraction, F, df1, df2, p, eta_squared`` (share of the variance; partial within participants); within
-            participants also ``epsilon`` and ``p_corrected`` (Greenhouse-Geisser); with Holm also ``p_holm``.
-        means: ``fraction``, the factor, ``n, mean, sd, half_width, low, high``: two bands of
-            ``q * sqrt(MSE / n) / 2`` that do not overlap are a difference by Tukey's test.
-        pairs: ``fraction, a, b, difference`` (a - b), ``low, high`` (simultaneous interval), ``p`` (Tukey),
-            ``cohens_d``, ``hedges_g`` (both by the pooled spread of units); with Holm also ``p_holm``.
-        factor: What was compared.
-        unit: What counted as independent.
-        design: ``"between"`` (other units in each condition) or ``"within"`` (the same ones in all).
-        alpha: Level of the bands and intervals.
-        dropped: Units that were left out because a condition lacks them.
-        definition: What the values are, if the evaluation said so.
+        row: ``F, df1, df2, p, eta_squared`` and what a design adds. Where no value varies within conditions, ``F`` is
+            infinite and ``p`` 0 if means differ, ``F`` is NaN and ``p`` 1 if all values are equal.
+        error: Mean square error.
+        freedom: Its degrees of freedom.
     """
 
-    anova: pd.DataFrame = field(repr=False)
-    means: pd.DataFrame = field(repr=False)
-    pairs: pd.DataFrame = field(repr=False)
-    factor: str
-    unit: str
-    design: str
-    alpha: float
-    dropped: int = 0
-    definition: str = ""
+    row: dict[str, float]
+    error: float
+    freedom: int
 
 
-def compare_conditions(
-    results: Evaluation | pd.DataFrame | Mapping[str, Evaluation | pd.DataFrame],
-    *,
-    factor: str = "condition",
-    unit: Unit = "participant",
-    design: Design = "auto",
-    predictor: str | None = None,
-    value: str = "correct",
-    at: Literal["each", "mean"] = "each",
-    correct_fractions: Literal["holm"] | None = None,
-    alpha: float = 0.05,
-) -> Comparison:
-    """Test whether people are read better in some conditions, or by some predictors, than in others.
-
-    Args:
-        results: An evaluation, its ``table``, or several by the name of their condition (which then is the factor).
-        factor: The column to compare: ``"condition"``, ``"layout"`` or ``"predictor"``.
-        unit: What is independent: values are averaged within each before anything is tested, so that a person counts
-            once, however many walks are recorded; means differ from those over walks. ``"fold"`` is the practice of
-            treating folds as samples; it is warned about.
-        design: ``"within"`` is a repeated-measures ANOVA, for the same units in every condition; ``"between"`` the
-            one-way ANOVA. ``"auto"`` takes ``"within"`` if all units are in all conditions and ``"between"`` if none is
-            in two.
-        predictor: Whose values, where there are several and they are not the factor.
-        value: The column that holds them.
-        at: ``"each"`` fraction observed, or their ``"mean"`` (``fraction`` is then NaN).
-        correct_fractions: ``"holm"`` adds p-values that hold over all fractions together (per pair in ``pairs``).
-        alpha: Level of Tukey's bands and intervals.
-
-    Returns:
-        Tables; see :class:`Comparison`. Where no value varies within conditions, ``F`` is infinite and ``p`` 0 if means
-        differ, ``F`` is NaN and ``p`` 1 if all values are equal.
-
-    Raises:
-        ValueError: Fewer than two conditions or than two units in one, missing columns or values, several predictors,
-            results of different cuts or candidate sets, or units that are in some conditions but not in all.
-
-    Warns:
-        UserWarning: Folds as units; units dropped because a condition lacks them.
-    """
-    if not 0 < alpha < 1:
-        raise ValueError(f"`alpha` must be between 0 and 1, got {alpha!r}")
-    if at not in ("each", "mean"):
-        raise ValueError(f"`at` must be 'each' or 'mean', got {at!r}")
-    if correct_fractions not in (None, "holm"):
-        raise ValueError(f"`correct_fractions` must be 'holm' or None, got {correct_fractions!r}")
-    if isinstance(results, Mapping):
-        factor = "condition" if factor == "layout" else factor
-    table = _one_table(results)
-    table = _chosen(table, factor, predictor, value)
-    if unit == "fold":
-        warnings.warn(
-            "folds share their trajectories and are not independent: with them as units, true null hypotheses are "
-            "rejected far more often than alpha; use unit='participant'",
-            UserWarning,
-            stacklevel=2,
-        )
-    table = _with_units(table, factor, unit)
-    levels = list(dict.fromkeys(table[factor].tolist()))
-    if len(levels) < 2:
-        raise ValueError(f"nothing to compare: the only {factor} is {levels[0]!r}" if levels else "no rows to compare")
-    chosen, table, dropped = _designed(table, factor, unit, levels, design)
-    tables = _tests(table, factor, levels, value, chosen, at, alpha)
-    if correct_fractions == "holm":
-        _correct(tables)
-    anova, means, pairs = tables
-    definition = str(table.attrs.get("evaluation", table.attrs.get("definition", "")))
-    return Comparison(anova, means, pairs, factor, unit, chosen, alpha, dropped, definition)
-
-
-# -- what is compared -------------------------------------------------------------------------------------------------
-
-
-def _one_table(results: Any) -> pd.DataFrame:
-    import pandas as pd
-
-    if not isinstance(results, Mapping):
-        return _rows_of(results)
-    parts = {str(name): _rows_of(part) for name, part in results.items()}
-    if not parts:
-        raise ValueError("no results to compare")
-    for key in ("cut", "ties", "candidate_set"):
-        found = {part.attrs[key] for part in parts.values() if key in part.attrs}
-        if len(found) > 1:
-            raise ValueError(f"results of different {key} {sorted(map(str, found))} must not be compared")
-    # Trajectories are numbered within each evaluation; people keep their names.
-    whole = pd.concat(
-        [
-            part.assign(condition=name, trajectory=[f"{name}/{number}" for number in part["trajectory"]])
-            if "trajectory" in part
-            else part.assign(condition=name)
-            for name, part in parts.items()
-        ],
-        ignore_index=True,
-    )
-    whole.attrs.update(next(iter(parts.values())).attrs)
-    return whole
-
-
-def _rows_of(results: Any) -> pd.DataFrame:
-    import pandas as pd
-
-    table = getattr(results, "table", results)
-    if not isinstance(table, pd.DataFrame):
-        raise ValueError(f"expected an evaluation or a table, got {type(results).__name__}")
-    return table
-
-
-def _chosen(table: pd.DataFrame, factor: str, predictor: str | None, value: str) -> pd.DataFrame:
-    missing = [name for name in (factor, value) if name not in table]
-    if missing:
-        raise ValueError(f"the table has no column {missing[0]!r}; it has {list(table.columns)}")
-    if "predictor" in table and factor != "predictor":
-        names = list(dict.fromkeys(table["predictor"]))
-        if predictor is None and len(names) > 1:
-            raise ValueError(f"say whose values to compare with predictor=; the table has {names}")
-        if predictor is not None and predictor not in names:
-            raise ValueError(f"no values of predictor {predictor!r}; the table has {names}")
-        if predictor is not None:
-            table = table[table["predictor"] == predictor]
-    if not np.isfinite(table[value].to_numpy(dtype=np.float64)).all():
-        raise ValueError(f"column {value!r} holds missing values; leave these rows out")
-    return table
-
-
-def _with_units(table: pd.DataFrame, factor: str, unit: str) -> pd.DataFrame:
-    """The table with a column ``_unit``: the same text, the same independent unit."""
-    needed = {"participant": ["participant"], "trajectory": ["trajectory"], "fold": ["repeat", "fold"]}
-    if unit not in needed:
-        raise ValueError(f"`unit` must be one of {list(needed)}, got {unit!r}")
-    missing = [name for name in needed[unit] if name not in table]
-    if missing:
-        raise ValueError(f"unit {unit!r} needs the column {missing[0]!r}")
-    names = table[needed[unit][0]].astype(str)
-    if unit == "participant" and (names == "").any():
-        raise ValueError("some rows name no participant; name them, or use unit='trajectory'")
-    if unit == "fold":
-        names = names + "/" + table["fold"].astype(str)
-        if factor != "predictor":  # fold 1 of one condition has nothing to do with fold 1 of another
-            names = table[factor].astype(str) + "/" + names
-    return table.assign(_unit=names)
-
-
-def _designed(
-    table: pd.DataFrame, factor: str, unit: str, levels: Sequence[Any], design: str
-) -> tuple[str, pd.DataFrame, int]:
-    """Between or within, and only the units that this design can use."""
-    if design not in ("auto", "between", "within"):
-        raise ValueError(f"`design` must be 'auto', 'between' or 'within', got {design!r}")
-    seen = table.groupby("_unit")[factor].nunique()
-    if design == "auto":
-        if (seen == len(levels)).all():
-            design = "within"
-        elif (seen == 1).all():
-            design = "between"
-        else:
-            whole = int((seen == len(levels)).sum())
-            raise ValueError(
-                f"of {len(seen)} {unit}s, {whole} are in all {len(levels)} conditions and {int((seen == 1).sum())} in "
-                "one; say design='within' to keep the former only, or design='between' to take all for independent"
-            )
-    if design == "between" or (seen == len(levels)).all():
-        return design, table, 0
-    kept = seen.index[seen == len(levels)]
-    dropped = len(seen) - len(kept)
-    warnings.warn(
-        f"{dropped} of {len(seen)} {unit}s are not in every condition and were left out", UserWarning, stacklevel=3
-    )
-    return design, table[table["_unit"].isin(kept)], dropped
-
-
-# -- the tests --------------------------------------------------------------------------------------------------------
-
-
-def _tests(
-    table: pd.DataFrame, factor: str, levels: Sequence[Any], value: str, design: str, at: str, alpha: float
-) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
-    import pandas as pd
-
-    slices: list[tuple[float, pd.DataFrame]] = [(float("nan"), table)]
-    if at == "each" and "fraction" in table:
-        slices = [(float(fraction), part) for fraction, part in table.groupby("fraction", sort=True)]  # type: ignore[arg-type]
-    anova, means, pairs = [], [], []
-    for fraction, part in slices:
-        wide = part.groupby(["_unit", factor], sort=False)[value].mean().unstack(factor)
-        wide = wide.reindex(columns=list(levels))
-        samples = [wide[level].dropna().to_numpy(dtype=np.float64) for level in levels]
-        for level, sample in zip(levels, samples, strict=True):
-            if len(sample) < 2:
-                raise ValueError(f"{factor} {level!r} has {len(sample)} unit(s) at fraction {fraction}; 2 are needed")
-        if design == "within" and len({len(sample) for sample in samples}) > 1:
-            raise ValueError(f"some units lack values at fraction {fraction}")
-        result, error, freedom = _within(np.column_stack(samples)) if design == "within" else _between(samples)
-        anova.append({"fraction": fraction, **result})
-        for level, sample in zip(levels, samples, strict=True):
-            half = tukey_half_width(error, len(sample), len(levels), freedom, alpha)
-            row = {"fraction": fraction, factor: level, "n": len(sample), "mean": sample.mean()}
-            row |= {"sd": sample.std(ddof=1), "half_width": half}
-            means.append(row | {"low": sample.mean() - half, "high": sample.mean() + half})
-        for i, j in combinations(range(len(levels)), 2):
-            row = {"fraction": fraction, "a": levels[i], "b": levels[j]}
-            row |= _tukey(samples[i], samples[j], error, freedom, len(levels), alpha)
-            pairs.append(row | _effect(samples[i], samples[j]))
-    return pd.DataFrame(anova), pd.DataFrame(means), pd.DataFrame(pairs)
-
-
-def _between(samples: Sequence[Values]) -> tuple[dict[str, float], float, int]:
-    """One-way ANOVA: its row, the mean square error and its degrees of freedom."""
+def one_way_anova(samples: Sequence[Values]) -> Anova:
+    """One-way analysis of variance of independent samples, two values or more in each."""
     total, count = np.concatenate(samples), len(samples)
     grand = total.mean()
     between = sum(len(sample) * (sample.mean() - grand) ** 2 for sample in samples)
     rest = sum(((sample - sample.mean()) ** 2).sum() for sample in samples)
     freedom = len(total) - count
     row = _f_test(float(between), count - 1, float(rest), freedom)
-    return row, float(rest) / freedom, freedom
+    return Anova(row, float(rest) / freedom, freedom)
 
 
-def _within(table: Values) -> tuple[dict[str, float], float, int]:
-    """Repeated-measures ANOVA of ``(units, conditions)``, with Greenhouse and Geisser's correction."""
+def repeated_measures_anova(table: Values) -> Anova:
+    """Repeated-measures analysis of variance of ``(units, conditions)``.
+
+    Its row also has ``epsilon`` and ``p_corrected``, the correction of Greenhouse and Geisser (1959).
+    """
     from scipy import stats
 
     number, count = table.shape
@@ -292,20 +73,20 @@ def _within(table: Values) -> tuple[dict[str, float], float, int]:
     centre = np.eye(count) - 1 / count
     covariance = centre @ np.cov(table, rowvar=False) @ centre
     square = float((covariance**2).sum())
-    epsilon = 1.0 if square < _NO_VARIANCE**2 else float(np.trace(covariance) ** 2 / ((count - 1) * square))
+    epsilon = 1.0 if square < NO_VARIANCE**2 else float(np.trace(covariance) ** 2 / ((count - 1) * square))
     epsilon = min(max(epsilon, 1 / (count - 1)), 1.0)
     row["epsilon"] = epsilon
     finite = np.isfinite(row["F"])
     row["p_corrected"] = float(stats.f.sf(row["F"], epsilon * (count - 1), epsilon * freedom)) if finite else row["p"]
-    return row, rest / freedom, freedom
+    return Anova(row, rest / freedom, freedom)
 
 
 def _f_test(between: float, df1: int, rest: float, df2: int) -> dict[str, float]:
     from scipy import stats
 
     effect, error = between / df1, rest / df2
-    if error < _NO_VARIANCE:
-        equal = effect < _NO_VARIANCE
+    if error < NO_VARIANCE:
+        equal = effect < NO_VARIANCE
         value, p, share = (float("nan"), 1.0, 0.0) if equal else (float("inf"), 0.0, 1.0)
     else:
         value, share = effect / error, between / (between + rest)
@@ -328,7 +109,7 @@ def tukey_half_width(error: float, n: float, count: int, freedom: int, alpha: fl
     Returns:
         The half-width; 0 where nothing varies.
     """
-    return 0.0 if error < _NO_VARIANCE else _range_quantile(1 - alpha, count, freedom) * float(np.sqrt(error / n)) / 2
+    return 0.0 if error < NO_VARIANCE else _range_quantile(1 - alpha, count, freedom) * float(np.sqrt(error / n)) / 2
 
 
 @lru_cache(maxsize=256)  # a quantile takes a tenth of a second, and is the same for every fraction
@@ -349,11 +130,20 @@ def _range_tail(value: float, count: int, freedom: int) -> float:
     return float(np.clip(stats.studentized_range.sf(value, count, freedom), 0.0, 1.0))
 
 
-def _tukey(a: Values, b: Values, error: float, freedom: int, count: int, alpha: float) -> dict[str, float]:
-    """Tukey-Kramer for one pair: difference, simultaneous interval, p."""
+def tukey_pair(a: Values, b: Values, error: float, freedom: int, count: int, alpha: float) -> dict[str, float]:
+    """Tukey and Kramer's test of one pair of samples out of ``count``: ``difference, low, high, p``.
+
+    Args:
+        a: One sample.
+        b: The other; differences are a - b.
+        error: Mean square error of the ANOVA.
+        freedom: Its degrees of freedom.
+        count: Number of samples compared.
+        alpha: Family-wise level of the interval.
+    """
     difference = float(a.mean() - b.mean())
-    if error < _NO_VARIANCE:
-        p = 1.0 if abs(difference) < np.sqrt(_NO_VARIANCE) else 0.0
+    if error < NO_VARIANCE:
+        p = 1.0 if abs(difference) < np.sqrt(NO_VARIANCE) else 0.0
         return {"difference": difference, "low": difference, "high": difference, "p": p}
     scale = float(np.sqrt(error / 2 * (1 / len(a) + 1 / len(b))))
     reach = _range_quantile(1 - alpha, count, freedom) * scale
@@ -361,16 +151,42 @@ def _tukey(a: Values, b: Values, error: float, freedom: int, count: int, alpha: 
     return {"difference": difference, "low": difference - reach, "high": difference + reach, "p": p}
 
 
-def _effect(a: Values, b: Values) -> dict[str, float]:
-    """Cohen's d with the pooled standard deviation, and Hedges' g (Hedges 1981, the approximate correction)."""
+def effect_sizes(a: Values, b: Values) -> dict[str, float]:
+    """``cohens_d`` and ``hedges_g`` of two samples; see :func:`hedges_g` for samples that do not vary."""
+    d = _cohens_d(a, b)
+    return {"cohens_d": d, "hedges_g": d * _small_sample_factor(a, b)}
+
+
+def hedges_g(a: Values, b: Values) -> float:
+    """Difference of two means in units of their pooled spread, corrected for small samples (Hedges, 1981).
+
+    The correction is the approximate one, 1 - 3 / (4 (n_a + n_b - 2) - 1).
+
+    Args:
+        a: ``(n_a,)`` values.
+        b: ``(n_b,)`` values.
+
+    Returns:
+        (mean of a - mean of b) / pooled standard deviation * correction. NaN where a sample has fewer than two values:
+        its spread is unknown. Where nothing varies within either sample (pooled variance below 1e-12), 0 if their
+        means are equal (to 1e-6), and infinite with the sign of the difference if they are not.
+    """
+    if min(len(a), len(b)) < 2:
+        return float("nan")
+    return _cohens_d(a, b) * _small_sample_factor(a, b)
+
+
+def _cohens_d(a: Values, b: Values) -> float:
     freedom = len(a) + len(b) - 2
     pooled = float(np.sqrt((((a - a.mean()) ** 2).sum() + ((b - b.mean()) ** 2).sum()) / freedom))
     difference = float(a.mean() - b.mean())
-    if pooled**2 < _NO_VARIANCE:
-        d = 0.0 if abs(difference) < np.sqrt(_NO_VARIANCE) else float(np.copysign(np.inf, difference))
-    else:
-        d = difference / pooled
-    return {"cohens_d": d, "hedges_g": d * (1 - 3 / (4 * freedom - 1))}
+    if pooled**2 < NO_VARIANCE:
+        return 0.0 if abs(difference) < np.sqrt(NO_VARIANCE) else float(np.copysign(np.inf, difference))
+    return difference / pooled
+
+
+def _small_sample_factor(a: Values, b: Values) -> float:
+    return 1 - 3 / (4 * (len(a) + len(b) - 2) - 1)
 
 
 def holm(p: npt.ArrayLike) -> Values:
@@ -382,11 +198,3 @@ def holm(p: npt.ArrayLike) -> Values:
     steps = values[order] * np.arange(len(order), 0, -1)
     adjusted[order] = np.minimum(np.maximum.accumulate(steps), 1.0) if len(order) else steps
     return adjusted
-
-
-def _correct(tables: tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]) -> None:
-    anova, _, pairs = tables
-    anova["p_holm"] = holm(anova["p_corrected"] if "p_corrected" in anova else anova["p"])
-    pairs["p_holm"] = np.nan
-    for _, part in pairs.groupby(["a", "b"], sort=False):
-        pairs.loc[part.index, "p_holm"] = holm(part["p"])

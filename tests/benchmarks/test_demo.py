@@ -106,10 +106,10 @@ def test_no_network_is_one_line_not_an_error(monkeypatch: pytest.MonkeyPatch, tm
 @pytest.mark.data
 @pytest.mark.skipif(not have_recordings(), reason="the recorded games are not here: legible humans fetch")
 def test_recorded_play_agrees_with_every_walk_scored_by_itself() -> None:
-    from benchmarks.experiments.prediction.run import score_every_walk
+    from benchmarks.experiments.prediction.run import score_every_trajectory
     from benchmarks.experiments.prediction.sweep import UNTRAINED
 
-    walks = score_every_walk(predictors=UNTRAINED, repeats=1)
+    walks = score_every_trajectory(predictors=UNTRAINED, repeats=1)
     summary = recorded_play(fetch=False)
     for curve in summary["curves"]:
         own = walks[walks["predictor"] == curve["label"]]

@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks.experiments.hypotheses import HYPOTHESES, assess_hypotheses, hedges_g, reached_at
-from predictors.evaluation.statistics import compare_conditions
+from benchmarks.experiments.hypotheses import HYPOTHESES, assess_hypotheses, reached_at
+from predictors.evaluation.comparison import compare_conditions
 
 FRACTIONS = (0.1, 0.3, 0.5, 0.7, 0.9)
 
@@ -128,15 +128,6 @@ def test_one_layout_per_condition_takes_people_as_units() -> None:
 def test_rows_that_cannot_be_tested_are_refused(change, message: str) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(ValueError, match=message):
         assess_hypotheses(change(people(GAINS)), treatment="Legible", controls=["Random"])
-
-
-def test_effect_sizes() -> None:
-    a, b = np.array([1.0, 2, 3, 4]), np.array([0.0, 1, 2, 3])
-    assert hedges_g(a, b) == pytest.approx(1 / np.std(a, ddof=1) * (1 - 3 / 23))
-    assert hedges_g(a, b) == -hedges_g(b, a)
-    assert math.isnan(hedges_g(a[:1], b))
-    assert hedges_g(np.ones(3), np.zeros(3)) == math.inf
-    assert hedges_g(np.ones(3), np.ones(3)) == 0
 
 
 def test_when_a_level_is_reached() -> None:

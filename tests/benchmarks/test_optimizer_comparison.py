@@ -1,4 +1,4 @@
-"""The comparison of optimisers: its cells, its statistics against definitions, a whole small run from files."""
+"""The comparison of optimisers: its trials, its statistics against definitions, a whole small run from files."""
 
 import numpy as np
 import pandas as pd
@@ -15,8 +15,8 @@ from benchmarks.experiments.optimizers.analysis import (
     pairwise,
     summary,
 )
-from benchmarks.experiments.optimizers.run import run_cell
-from benchmarks.experiments.optimizers.sweep import METHODS, OPTIMUM_5X5, PUBLISHED, cells_of
+from benchmarks.experiments.optimizers.run import run_search
+from benchmarks.experiments.optimizers.sweep import METHODS, OPTIMUM_5X5, PUBLISHED, trials_of
 from legible_envs.overcooked import OvercookedLayout, OvercookedWorkspace
 from optimizers import list_emitters
 
@@ -24,26 +24,26 @@ TINY = Settings(grids=((5, 5),), seeds=2, budgets=(300,), large=((400, (5, 5), 1
 
 
 def test_the_full_comparison_is_that_of_the_issue():
-    cells = cells_of(FULL)
-    assert {tuple(cell["workspace"]["shape"]) for cell in cells} == {(5, 5), (7, 7), (9, 9), (5, 9)}
-    assert {cell["budget"] for cell in cells} == {"paper", "2000", "20000", "200000", "1000000"}
-    assert {cell["method"] for cell in cells} == set(METHODS) <= set(list_emitters())
-    assert {cell["seed"] for cell in cells if cell["budget"] != "200000"} == set(range(10))
-    assert {cell["method"] for cell in cells if cell["budget"] == "200000" and cell["seed"] < 10} == set(METHODS)
-    assert {cell["method"] for cell in cells if cell["seed"] >= 10} == {"annealing", "improve"}
-    assert all(cell["workspace"]["prefix"] == "sum" for cell in cells)
-    paper = {cell["method"]: cell["iterations"] for cell in cells if cell["budget"] == "paper"}
+    trials = trials_of(FULL)
+    assert {tuple(trial["workspace"]["shape"]) for trial in trials} == {(5, 5), (7, 7), (9, 9), (5, 9)}
+    assert {trial["budget"] for trial in trials} == {"paper", "2000", "20000", "200000", "1000000"}
+    assert {trial["method"] for trial in trials} == set(METHODS) <= set(list_emitters())
+    assert {trial["seed"] for trial in trials if trial["budget"] != "200000"} == set(range(10))
+    assert {trial["method"] for trial in trials if trial["budget"] == "200000" and trial["seed"] < 10} == set(METHODS)
+    assert {trial["method"] for trial in trials if trial["seed"] >= 10} == {"annealing", "improve"}
+    assert all(trial["workspace"]["prefix"] == "sum" for trial in trials)
+    paper = {trial["method"]: trial["iterations"] for trial in trials if trial["budget"] == "paper"}
     assert paper == {"improve": [100, 100], "nslc": [20, 180], "differential-evolution": [20, 200]}
-    assert len(cells) == len({str(cell) for cell in cells})
-    assert len(cells_of(QUICK)) < len(cells) / 4
+    assert len(trials) == len({str(trial) for trial in trials})
+    assert len(trials_of(QUICK)) < len(trials) / 4
     fewer = FULL.with_seeds(7)
-    assert {cell["seed"] for cell in cells_of(fewer)} == set(range(7))
+    assert {trial["seed"] for trial in trials_of(fewer)} == set(range(7))
     assert [own for _, _, own in fewer.large] == [7, 7, 7, 7]
 
 
 def test_nslc_in_the_papers_budget_is_ten_generations_of_twenty():
-    (cell,) = [c for c in cells_of(TINY) if c["method"] == "nslc" and c["budget"] == "paper" and c["seed"] == 0][:1]
-    rows = run_cell(cell)
+    (trial,) = [c for c in trials_of(TINY) if c["method"] == "nslc" and c["budget"] == "paper" and c["seed"] == 0][:1]
+    rows = run_search(trial)
     assert rows[-1]["scored"] == 200
 
 
@@ -58,7 +58,7 @@ def folder(tmp_path_factory):
 def test_a_small_run_leaves_results_tables_and_figures(folder):
     rows = pd.read_csv(folder / "searches.csv", dtype={"budget": str})
     ends = rows[rows["moment"] == "end"]
-    assert len(ends) == len(cells_of(TINY)) == 2 * 3 + 2 * len(METHODS) + 2
+    assert len(ends) == len(trials_of(TINY)) == 2 * 3 + 2 * len(METHODS) + 2
     for _, row in ends.head(6).iterrows():
         shape = tuple(int(side) for side in row["grid"].split("x"))
         workspace = OvercookedWorkspace(shape=shape, prefix="sum")
@@ -131,7 +131,9 @@ def test_tests_and_effect_sizes_are_those_of_their_definitions():
     same = pairwise(ends_of({"annealing": [1.0] * 4, "improve": [1.0] * 4}))
     assert same["p"].item() == 1.0
     assert same["superiority"].item() == 0.5
-    assert np.isnan(same["hedges_g"].item())
+    assert same["hedges_g"].item() == 0.0
+    apart = pairwise(ends_of({"annealing": [2.0] * 4, "improve": [1.0] * 4}))
+    assert apart["hedges_g"].item() == np.inf
 
 
 def test_gaps_count_who_reaches_the_proven_optimum():

@@ -1,4 +1,4 @@
-"""The paper's kitchens, from searches to words: people, cells, tables, and a whole run made small."""
+"""The paper's kitchens, from searches to words: people, trials, tables, and a whole run made small."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks.experiments.overcooked import analysis, run, tables
+from benchmarks.experiments.overcooked import analysis, narrative, run, tables
 from benchmarks.experiments.overcooked.sweep import (
     CONDITIONS,
     FITTED,
@@ -21,9 +21,9 @@ from benchmarks.experiments.overcooked.sweep import (
     QUICK,
     WALKERS,
     Settings,
-    layout_cells,
+    accuracy_trials,
+    layout_trials,
     people_of,
-    reading_cells,
 )
 from legible_envs.overcooked import OvercookedLayout, OvercookedWorkspace
 from legible_envs.overcooked.humans import BoltzmannWalker, PlannerWalker
@@ -127,28 +127,28 @@ def test_fits_replace_the_numbers_kept_as_data() -> None:
     assert (found["planner"]["depth"], found["planner"]["people"]) == (3, [[0.5, 0.1]])
 
 
-# -- cells ------------------------------------------------------------------------------------------------------------
+# -- trials ------------------------------------------------------------------------------------------------------------
 
 
 def test_cells_cover_every_combination_once() -> None:
     for settings in (FULL, QUICK):
-        layouts = layout_cells(settings)
+        layouts = layout_trials(settings)
         assert len(layouts) == 4 * settings.layouts
-        places = [{**cell, "drawing": "X"} for cell in layouts]
-        cells = reading_cells(settings, places, people_of(pd.DataFrame()))
-        keys = {(c["condition"], c["layout"], c["walker"], c["predictor"]) for c in cells}
-        assert len(keys) == len(cells) == len(layouts) * len(WALKERS) * len(settings.predictors)
-        seeds = {(c["condition"], c["layout"], c["walker"]): c["seed"] for c in cells}
+        places = [{**trial, "drawing": "X"} for trial in layouts]
+        trials = accuracy_trials(settings, places, people_of(pd.DataFrame()))
+        keys = {(c["condition"], c["layout"], c["walker"], c["predictor"]) for c in trials}
+        assert len(keys) == len(trials) == len(layouts) * len(WALKERS) * len(settings.predictors)
+        seeds = {(c["condition"], c["layout"], c["walker"]): c["seed"] for c in trials}
         assert len(set(seeds.values())) == len(seeds)
-        assert all(c["seed"] == seeds[c["condition"], c["layout"], c["walker"]] for c in cells)
+        assert all(c["seed"] == seeds[c["condition"], c["layout"], c["walker"]] for c in trials)
     assert FULL.layouts >= 5
     assert FULL.participants == 20
     assert (FULL.initial, FULL.improvements) == (1000, 1000)
 
 
 def test_random_is_the_median_of_random_layouts() -> None:
-    cell = {"condition": "Random", "layout": 3, "shape": [5, 5], "initial": 101, "improvements": 0}
-    (row,) = run.find_layout(cell)
+    trial = {"condition": "Random", "layout": 3, "shape": [5, 5], "initial": 101, "improvements": 0}
+    (row,) = run.find_layout(trial)
     workspace = OvercookedWorkspace((5, 5))
     scores = workspace.legibility(workspace.sample(101, np.random.default_rng(3)))
     assert row["score"] == pytest.approx(float(np.median(scores)))
@@ -162,7 +162,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run made small, without recordings."""
     place = tmp_path_factory.mktemp("conditions")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(run, "_recorded_walks", lambda: 0)
+        patch.setattr(run, "_num_recorded", lambda: 0)
         run.reproduce(place, workers=1, settings=TINY)
     return place
 
@@ -175,8 +175,8 @@ def test_a_run_writes_tables_figures_and_words(folder: Path) -> None:
     titles = [section.title for section in sections]
     assert "Hypotheses" in titles
     assert "Beside the paper" in titles
-    people = next(section for section in sections if section.title == "People")
-    assert "The recordings are not there" in people.text
+    participants = next(section for section in sections if section.title == "Participants")
+    assert "The recordings are not there" in participants.text
     for section in sections:
         assert all(path.is_file() and path.stat().st_size > 500 for path in section.figures)
         assert all(len(table) for table in section.tables.values())
@@ -203,7 +203,7 @@ def test_accuracy_is_that_of_the_metrics(folder: Path) -> None:
 
 @pytest.mark.slow
 def test_a_second_run_does_nothing_and_changes_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(run, "_recorded_walks", lambda: 0)
+    monkeypatch.setattr(run, "_num_recorded", lambda: 0)
     analysis.sections(folder)
     before = {path: path.read_bytes() for path in sorted((folder / "tables").iterdir())}
     events = []
@@ -216,8 +216,8 @@ def test_a_second_run_does_nothing_and_changes_nothing(folder: Path, monkeypatch
 @pytest.mark.slow
 def test_the_same_seeds_give_the_same_walks(folder: Path) -> None:
     places = tables.load_results(folder).layouts.to_dict("records")
-    cells = reading_cells(TINY, places, people_of(pd.DataFrame()))  # type: ignore[arg-type]
-    one, other = (run.simulate(cells[0]) for _ in range(2))
+    trials = accuracy_trials(TINY, places, people_of(pd.DataFrame()))  # type: ignore[arg-type]
+    one, other = (run.simulate(trials[0]) for _ in range(2))
     assert [walk.states.tolist() for walk in one] == [walk.states.tolist() for walk in other]
     assert all(len(walk.candidates) > 1 for walk in one)
     assert len({walk.participant for walk in one}) == 3
@@ -243,16 +243,16 @@ def beside(ours: dict[str, float]) -> pd.DataFrame:
 
 def test_words_follow_the_figures() -> None:
     paper = {name: PUBLISHED[name]["f1"] for name in CONDITIONS}
-    same = analysis.agreement(beside(paper))
+    same = narrative.about_agreement(beside(paper))
     assert "the same order of conditions as in the paper" in same
     assert "about as much as the paper's +0.322" in same
     turned = dict(zip(CONDITIONS, reversed(paper.values()), strict=True))
-    reverse = analysis.agreement(beside(turned))
+    reverse = narrative.about_agreement(beside(turned))
     assert "6 of 6 pairs of conditions in another order" in reverse
     assert "by -0.322 over random ones, less than" in reverse
     for name, other in itertools.pairwise(CONDITIONS):
         swapped = {**paper, name: paper[other], other: paper[name]}
-        assert "1 of 6 pairs of conditions in another order" in analysis.agreement(beside(swapped))
+        assert "1 of 6 pairs of conditions in another order" in narrative.about_agreement(beside(swapped))
 
 
 def test_settings_can_be_changed_by_users() -> None:

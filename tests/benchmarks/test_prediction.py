@@ -1,4 +1,4 @@
-"""The benchmark on recorded people: its tables, its command, and what it reads."""
+"""The benchmark on recorded people: its tables, its command, and what it loads."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from benchmarks.experiments.prediction.sweep import (
     PREDICTORS,
     REFERENCE,
     Experiment,
-    Setting,
 )
+from benchmarks.experiments.predictor_settings import PredictorSetting
 from legible_envs.datasets.pointing import load_pointing
 from predictors.neural import training
 
@@ -44,7 +44,7 @@ RECORDED = scores(
 )
 
 
-def test_references_belong_to_predictors_that_are_judged() -> None:
+def test_references_belong_to_predictors_that_are_evaluated() -> None:
     assert set(REFERENCE) <= {setting.label for setting in (*PREDICTORS, *NEURAL)}
     assert set(POINTING_REFERENCE) <= {setting.label for setting in (*POINTING_PREDICTORS, *POINTING_NEURAL)}
     for settings in ((*PREDICTORS, *NEURAL), (*POINTING_PREDICTORS, *POINTING_NEURAL)):
@@ -66,17 +66,21 @@ def test_a_row_says_what_was_measured_and_the_difference() -> None:
 
 
 def test_those_that_take_minutes_are_repeated_less_often() -> None:
-    settings = [Setting("a", "bayesian"), Setting("b", "shortest-distance"), Setting("c", "bayesian", repeats=1)]
+    settings = [
+        PredictorSetting("a", "bayesian"),
+        PredictorSetting("b", "shortest-distance"),
+        PredictorSetting("c", "bayesian", max_repeats=1),
+    ]
     assert [(count, list(made)) for count, made in run._by_repeats(settings, 3)] == [(3, ["a", "b"]), (1, ["c"])]
     assert [(count, list(made)) for count, made in run._by_repeats(settings, 1)] == [(1, ["a", "b", "c"])]
 
 
 def test_an_experiment_has_no_other_settings() -> None:
     with pytest.raises(TypeError, match="flods"):
-        run.score_every_walk(flods=3)
+        run.score_every_trajectory(flods=3)
 
 
-def judged(monkeypatch: pytest.MonkeyPatch) -> list[Experiment]:
+def evaluated(monkeypatch: pytest.MonkeyPatch) -> list[Experiment]:
     asked: list[Experiment] = []
 
     def score_recorded_play(folder: object, experiment: Experiment, *, tell: object) -> pd.DataFrame:
@@ -94,7 +98,7 @@ def without_torch() -> None:
 
 
 def test_the_command_prints_and_writes_tables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    asked = judged(monkeypatch)
+    asked = evaluated(monkeypatch)
     (tmp_path / "data.csv").touch()
     stream = io.StringIO()
     judge_people(
@@ -107,8 +111,8 @@ def test_the_command_prints_and_writes_tables(tmp_path: Path, monkeypatch: pytes
     assert pd.read_csv(tmp_path / "out" / "kitchens.csv")["mean"].tolist() == [0.35, 0.5]
 
 
-def test_networks_are_judged_where_torch_is_installed(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked = judged(monkeypatch)
+def test_networks_are_evaluated_where_torch_is_installed(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = evaluated(monkeypatch)
     monkeypatch.setattr(training, "require_torch", lambda: None)
     stream = io.StringIO()
     judge_people(Console(file=stream, width=140), layouts=("random3",))

@@ -11,13 +11,14 @@ import pytest
 from scipy import stats
 
 from benchmarks.experiments.recorded import analysis, run
-from benchmarks.experiments.recorded.analysis import correlate, detectable, places_of, spearman, spearman_rows
-from benchmarks.experiments.recorded.sweep import FULL, QUICK, reading_cells, score_cells
-from benchmarks.trials import run_cells
+from benchmarks.experiments.recorded.analysis import correlate, places_of
+from benchmarks.experiments.recorded.sweep import FULL, QUICK, accuracy_trials, score_trials
+from benchmarks.trials import run_trials
 from legible_envs.legibility import From, goal_legibility
 from legible_envs.overcooked import OvercookedLayout
 from legible_envs.overcooked.humans import simulate_participants
 from legible_envs.overcooked.scoring.explanation import grid_graph
+from predictors.evaluation.rank_correlation import detectable, spearman, spearman_rows
 
 
 def logged(slope: float, places: int = 20, people: int = 12, seed: int = 0) -> tuple[pd.DataFrame, pd.DataFrame]:
@@ -86,7 +87,7 @@ def test_the_stated_power_is_about_right() -> None:
     assert math.isnan(detectable(4))
 
 
-# -- cells ------------------------------------------------------------------------------------------------------------
+# -- trials ------------------------------------------------------------------------------------------------------------
 
 KITCHEN = OvercookedLayout.from_ascii("XOXXTXX\nX     X\nX     D\nXXPXXSX")
 
@@ -94,11 +95,11 @@ KITCHEN = OvercookedLayout.from_ascii("XOXXTXX\nX     X\nX     D\nXXPXXSX")
 @pytest.fixture
 def recording(monkeypatch: pytest.MonkeyPatch) -> None:
     """Simulated people in place of the recorded ones."""
-    walks = simulate_participants(
+    trajectories = simulate_participants(
         KITCHEN, 6, np.random.default_rng(0), task=_task(), layout_name="room", condition="recorded", executions=3
     )
-    walks = [walk for walk in walks if len(walk.candidates) > 1]
-    monkeypatch.setattr(run, "_walks", lambda cell: walks)
+    trajectories = [one for one in trajectories if len(one.candidates) > 1]
+    monkeypatch.setattr(run, "_recorded", lambda trial: trajectories)
 
 
 def _task():  # type: ignore[no-untyped-def]
@@ -107,13 +108,13 @@ def _task():  # type: ignore[no-untyped-def]
     return soup_task([("tomato", "tomato", "onion"), ("onion", "onion", "onion")])
 
 
-def cell() -> dict[str, object]:
+def trial() -> dict[str, object]:
     return {"candidate_set": "all", "kitchen": "room", "recorded_walks": 1}
 
 
 @pytest.mark.usefixtures("recording")
 def test_stages_score_what_the_definition_says() -> None:
-    rows = pd.DataFrame(run.score_stages(cell()))  # type: ignore[arg-type]
+    rows = pd.DataFrame(run.score_stages(trial()))  # type: ignore[arg-type]
     assert {"pot", "serving"} >= set(rows["start"])
     graph = grid_graph(KITCHEN)
     for (start, goals), part in rows.groupby(["start", "goals"]):
@@ -130,11 +131,11 @@ def test_stages_score_what_the_definition_says() -> None:
 @pytest.mark.usefixtures("recording")
 def test_results_become_tables_figures_and_words(tmp_path: Path) -> None:
     settings = QUICK.__class__(predictors=("Eq. 1", "shortest distance"), layouts=("room",), candidate_sets=("all",))
-    for name, function, cells in (
-        ("scores", run.score_stages, score_cells(settings, 1)),
-        ("readings", run.read_stages, reading_cells(settings, 1)),
+    for name, function, trials in (
+        ("scores", run.score_stages, score_trials(settings, 1)),
+        ("readings", run.evaluate_by_stage, accuracy_trials(settings, 1)),
     ):
-        run_cells(function, cells, tmp_path, workers=1).to_csv(tmp_path / f"{name}.csv", index=False)
+        run_trials(function, trials, tmp_path, workers=1).to_csv(tmp_path / f"{name}.csv", index=False)
     readings = pd.read_csv(tmp_path / "readings.csv")
     assert readings.groupby("predictor")["walks"].sum().nunique() == 1
     (section,) = analysis.sections(tmp_path, bootstraps=50)
@@ -146,10 +147,10 @@ def test_results_become_tables_figures_and_words(tmp_path: Path) -> None:
 
 
 def test_cells_name_everything_that_matters() -> None:
-    assert len(reading_cells(FULL, 7)) == len(FULL.predictors) * len(score_cells(FULL, 7))
-    assert all(cell["recorded_walks"] == 7 for cell in reading_cells(QUICK, 7))
+    assert len(accuracy_trials(FULL, 7)) == len(FULL.predictors) * len(score_trials(FULL, 7))
+    assert all(trial["recorded_walks"] == 7 for trial in accuracy_trials(QUICK, 7))
     with pytest.raises(ValueError, match="no predictor is called 'x'"):
-        reading_cells(QUICK.__class__(predictors=("x",)), 1)
+        accuracy_trials(QUICK.__class__(predictors=("x",)), 1)
 
 
 def test_missing_results_say_so(tmp_path: Path) -> None:

@@ -11,24 +11,27 @@ from pathlib import Path
 import pandas as pd
 import pytest
 from click.testing import CliRunner
+from jinja2 import UndefinedError
 from PIL import Image
 
 from benchmarks.cli import reproduce as reproducing
 from benchmarks.cli.app import main
 from benchmarks.reports.experiment_report import Section, write_experiment_report, write_tables
-from benchmarks.trials import run_cells
+from benchmarks.reports.narrative import narrate
+from benchmarks.trials import run_trials
+from benchmarks.trials.functions import name_of
 from legible_envs.datasets.overcooked_2019 import RecordingsError
 
 
 @pytest.fixture
 def small_experiment(monkeypatch: pytest.MonkeyPatch) -> None:
-    """An experiment like the real ones: cells, a table from their results, sections from the table."""
+    """An experiment like the real ones: trials, a table from their results, sections from the table."""
     module, analysis = types.ModuleType("small_experiment"), types.ModuleType("small_experiment.analysis")
 
     def reproduce(folder, *, quick, seeds, workers, scheduler, progress):
-        cells = [{"seed": seed} for seed in range(seeds or (2 if quick else 4))]
-        rows = run_cells(
-            "tests.benchmarks.cell_functions:draw", cells, folder, workers=1, scheduler=scheduler, progress=progress
+        trials = [{"seed": seed} for seed in range(seeds or (2 if quick else 4))]
+        rows = run_trials(
+            "tests.benchmarks.trial_functions:draw", trials, folder, workers=1, scheduler=scheduler, progress=progress
         )
         write_tables(folder / "tables", [("values", rows)])
 
@@ -109,3 +112,38 @@ def test_the_page_holds_its_pictures_and_asks_for_nothing(tmp_path: Path) -> Non
     picture.rename(tmp_path / "a.gif")
     with pytest.raises(ValueError, match=r"must be one of.*\.png"):
         write_experiment_report(tmp_path, [Section("A", figures=[tmp_path / "a.gif"])], title="T", lede="L")
+
+
+def test_prose_names_all_its_figures_and_is_escaped_on_the_page(tmp_path: Path) -> None:
+    budgets = [
+        {"budget": "2000", "methods": ["<b>", "nslc"], "all": False},
+        {"budget": "paper", "methods": [], "all": False},
+    ]
+    text = narrate("optimizers/optimum", optimum=-1.5, budgets=budgets)
+    assert "Reached in every search: at 2,000 evaluations by <b>, nslc; at the paper's iterations by none." in text
+    page = write_experiment_report(tmp_path, [Section("A", text)], title="T", lede="L").read_text()
+    assert "&lt;b&gt;, nslc" in page
+    assert "<b>, nslc" not in page
+    with pytest.raises(UndefinedError, match="optimum"):
+        narrate("optimizers/optimum", budgets=budgets)
+
+
+@pytest.mark.parametrize(
+    ("function", "name", "before"),
+    [
+        ("optimizers.run:run_search", "optimizers/search", "optimizer_comparison.run:run_cell"),
+        ("overcooked.run:find_layout", "overcooked/layout", "overcooked_conditions.run:find_layout"),
+        ("overcooked.run:fit_people", "overcooked/people", "overcooked_conditions.run:fit_people"),
+        ("overcooked.run:evaluate_predictor", "overcooked/accuracy", "overcooked_conditions.run:read_people"),
+        ("overcooked.run:trace_learning_curve", "overcooked/curve", "overcooked_conditions.run:learn_people"),
+        ("tabletop.run:find_table", "tabletop/layout", "tabletop_conditions.run:find_table"),
+        ("tabletop.run:evaluate_predictor", "tabletop/accuracy", "tabletop_conditions.run:read_people"),
+        ("tabletop.run:trace_learning_curve", "tabletop/curve", "tabletop_conditions.run:learn_people"),
+        ("tabletop.run:spread_of_reaches", "tabletop/spread", "tabletop_conditions.run:spread_of_reaches"),
+        ("tabletop.run:play_with_robot", "tabletop/team", "tabletop_conditions.run:play_with_robot"),
+        ("recorded.run:score_stages", "recorded/score", "recorded_people.run:score_stages"),
+        ("recorded.run:evaluate_by_stage", "recorded/accuracy", "recorded_people.run:read_stages"),
+    ],
+)
+def test_trials_finished_under_earlier_names_of_functions_stay_valid(function: str, name: str, before: str) -> None:
+    assert name_of(f"benchmarks.experiments.{function}") == (name, (f"benchmarks.{before}",))

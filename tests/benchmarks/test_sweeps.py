@@ -1,4 +1,4 @@
-"""Sweeps: a file becomes cells, cells become tables; the same ones on any number of workers."""
+"""Sweeps: a file becomes trials, trials become tables; the same ones on any number of workers."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ KITCHEN = {"workspace": "overcooked", "shape": [5, 5], "prefix": "sum"}
 SMALL = {"workspaces": [KITCHEN], "emitters": ["improve", "random"], "evaluations": 400, "seeds": 2}
 
 
-def test_every_combination_is_one_cell() -> None:
+def test_every_combination_is_one_trial() -> None:
     plan = Sweep.from_dict(
         {
             "workspaces": ["overcooked", KITCHEN],
@@ -32,7 +32,7 @@ def test_every_combination_is_one_cell() -> None:
     )
     variants = list(plan.variants())
     assert len(variants) == 2 * 3 * 2 * 2 * 2
-    assert len({json.dumps(variant.cell, sort_keys=True) for variant in variants}) == len(variants)
+    assert len({json.dumps(variant.trial, sort_keys=True) for variant in variants}) == len(variants)
     assert {variant.labels["workspace"] for variant in variants} == {"overcooked", "overcooked shape=5x5 prefix=sum"}
     assert {variant.labels["emitter"] for variant in variants} == {"improve", "narrow", "random"}
     assert [variant.labels["seed"] for variant in variants[:4]] == [3, 5, 3, 5]
@@ -42,6 +42,9 @@ def test_every_combination_is_one_cell() -> None:
     ("change", "message"),
     [
         ({"workspaces": []}, "missing or empty"),
+        ({"workspaces": 3}, "`workspaces` must be a name, a table or a list of these, got 3"),
+        ({"emitters": 0.5}, "`emitters` must be a name, a table or a list of these, got 0.5"),
+        ({"seeds": True}, "`seeds` must hold integers, got True"),
         ({"grid": 1}, "unknown: \\['grid'\\]"),
         ({"workspaces": [{"shape": [5, 5]}]}, "key `workspace`"),
         ({"workspaces": ["kitchen"]}, "kitchen"),
@@ -95,7 +98,7 @@ def test_results_hold_what_was_searched_and_do_not_depend_on_workers(tmp_path: P
     np.testing.assert_allclose(summary["best_mean"][0], alone["best"][:2].mean())
 
 
-def test_predictors_read_people_in_the_best_layouts(tmp_path: Path) -> None:
+def test_predictors_are_evaluated_in_the_best_layouts(tmp_path: Path) -> None:
     people = {"predictors": ["shortest-distance", "bayesian"], "people": {"participants": 2, "executions": 1}}
     plan = Sweep.from_dict(SMALL | people | {"emitters": "random", "seeds": 1})
     table = run_sweep(plan, tmp_path, workers=1)
@@ -111,15 +114,15 @@ def test_what_was_not_measured_is_a_dash() -> None:
     assert [row["accuracy.bayesian"] for row in for_reading(table)] == ["0.75", "–"]
 
 
-def test_workspaces_may_have_readers_of_their_own() -> None:
+def test_workspaces_may_have_predictors_of_their_own() -> None:
     table = {"workspace": "tabletop", "predictors": ["reach-knn"], "people": {"participants": 3}}
     plan = Sweep.from_dict(SMALL | {"workspaces": [KITCHEN, table], "predictors": ["bayesian"], "seeds": 1})
-    cells = {variant.labels["workspace"]: variant.cell for variant in plan.variants()}
-    assert set(cells) == {"overcooked shape=5x5 prefix=sum", "tabletop"}
-    assert cells["overcooked shape=5x5 prefix=sum"]["predictors"] == ["bayesian"]
-    assert cells["tabletop"]["predictors"] == ["reach-knn"]
-    assert cells["tabletop"]["people"] == {"participants": 3}
-    assert cells["tabletop"]["workspace"] == {"workspace": "tabletop"}
+    trials = {variant.labels["workspace"]: variant.trial for variant in plan.variants()}
+    assert set(trials) == {"overcooked shape=5x5 prefix=sum", "tabletop"}
+    assert trials["overcooked shape=5x5 prefix=sum"]["predictors"] == ["bayesian"]
+    assert trials["tabletop"]["predictors"] == ["reach-knn"]
+    assert trials["tabletop"]["people"] == {"participants": 3}
+    assert trials["tabletop"]["workspace"] == {"workspace": "tabletop"}
 
 
 def test_the_command_runs_what_is_missing_and_tells_of_failures(tmp_path: Path) -> None:
@@ -130,14 +133,16 @@ def test_the_command_runs_what_is_missing_and_tells_of_failures(tmp_path: Path) 
     first = CliRunner().invoke(main, arguments)
     assert first.exit_code == 0, first.output
     assert "small" in first.output
-    cell = next((tmp_path / "out" / "cells").glob("*.json"))
-    stamp = cell.stat().st_mtime_ns
+    trial = next((tmp_path / "out" / "cells").glob("*.json"))
+    stamp = trial.stat().st_mtime_ns
     assert CliRunner().invoke(main, arguments).exit_code == 0
-    assert cell.stat().st_mtime_ns == stamp
-    file.write_text("\n".join([lines[0], "evaluations = 3000", 'emitters = ["tests.benchmarks.cell_functions:stuck"]']))
+    assert trial.stat().st_mtime_ns == stamp
+    file.write_text(
+        "\n".join([lines[0], "evaluations = 3000", 'emitters = ["tests.benchmarks.trial_functions:stuck"]'])
+    )
     failed = CliRunner().invoke(main, arguments)
     assert failed.exit_code == 1
-    assert "1 of 1 cells failed 2 times" in failed.output
+    assert "1 of 1 trials failed 2 times" in failed.output
     assert "nowhere to go" in failed.output
     wrong = CliRunner().invoke(main, ["sweep", str(tmp_path / "none.toml")])
     assert wrong.exit_code == 2

@@ -1,4 +1,4 @@
-"""The experiment on tables: its cells, its tables and words, and that it resumes; on a very small version of it."""
+"""The experiment on tables: its trials, its tables and words, and that it resumes; on a very small version of it."""
 
 from __future__ import annotations
 
@@ -22,18 +22,12 @@ from benchmarks.experiments.conditions import (
     slug,
     stacked,
 )
+from benchmarks.experiments.predictor_settings import PredictorSetting
 from benchmarks.experiments.tabletop import QUICK, Settings, narrative, reproduce, run, sections, sweep, tables
-from benchmarks.experiments.trial_rows import (
-    Judge,
-    by_table,
-    confusion_matrix,
-    curve_rows,
-    judged_rows,
-    logged_rows,
-    make_judge,
-)
+from benchmarks.experiments.trial_rows import accuracy_rows, by_table, confusion_matrix, curve_rows, logged_rows
 from benchmarks.reports.experiment_report import Section
 from legible_envs.tabletop import TabletopLayout, TabletopTask, TabletopWorkspace
+from predictors.evaluation import learning_curve
 
 SMALL = Settings(
     layouts=2,
@@ -47,7 +41,7 @@ SMALL = Settings(
     curve_repeats=2,
     crossing=(1.0,),
     samples=12,
-    readers=(sweep.READERS[0], sweep.READERS[3]),
+    robots=(sweep.ROBOTS[0], sweep.ROBOTS[3]),
     rounds=1,
 )
 
@@ -73,49 +67,49 @@ def results(small_run: Path) -> tables.Results:
 
 
 def place(condition: str = "Baseline", layout: TabletopLayout | None = None) -> dict[str, Any]:
-    """A table as cells name it."""
+    """A table as trials name it."""
     layout = layout or TabletopTask.named("columns").layout
     return {"condition": condition, "layout": 0, "json": json.dumps(layout.to_dict())}
 
 
-# -- cells ------------------------------------------------------------------------------------------------------------
+# -- trials ------------------------------------------------------------------------------------------------------------
 
 
 def test_settings_are_plain_data_and_every_cell_is_another() -> None:
     places = [place(condition) | {"layout": number} for condition in sweep.CONDITIONS for number in range(2)]
     for settings in (QUICK, SMALL, sweep.FULL):
-        made = (sweep.reading_cells, sweep.curve_cells, sweep.spread_cells, sweep.team_cells)
-        for cells in (sweep.layout_cells(settings), *(function(settings, places) for function in made)):
-            texts = [json.dumps(cell, sort_keys=True, allow_nan=False) for cell in cells]
+        made = (sweep.accuracy_trials, sweep.curve_trials, sweep.spread_trials, sweep.team_trials)
+        for trials in (sweep.layout_trials(settings), *(function(settings, places) for function in made)):
+            texts = [json.dumps(trial, sort_keys=True, allow_nan=False) for trial in trials]
             assert len(set(texts)) == len(texts) > 0
     assert sweep.FULL.layouts >= 5
     assert (sweep.FULL.participants, sweep.FULL.curve_repeats) == (12, 10)
 
 
-def test_the_same_people_are_read_by_everybody_and_others_at_other_tables() -> None:
-    cells = sweep.reading_cells(SMALL, [place("Both"), place("Baseline")])
-    seeds = {condition: {cell["seed"] for cell in cells if cell["condition"] == condition} for condition in
+def test_all_predictors_meet_the_same_participants_and_other_tables_have_others() -> None:
+    trials = sweep.accuracy_trials(SMALL, [place("Both"), place("Baseline")])
+    seeds = {condition: {trial["seed"] for trial in trials if trial["condition"] == condition} for condition in
              ("Both", "Baseline")}  # fmt: skip
     assert len(seeds["Both"]) == len(seeds["Baseline"]) == 1
     assert seeds["Both"] != seeds["Baseline"]
-    assert {cell["crossing"] for cell in cells if cell["condition"] == "Baseline"} == {0.0}
-    assert {cell["crossing"] for cell in cells if cell["condition"] == "Both"} == {0.0, 1.0}
+    assert {trial["crossing"] for trial in trials if trial["condition"] == "Baseline"} == {0.0}
+    assert {trial["crossing"] for trial in trials if trial["condition"] == "Both"} == {0.0, 1.0}
 
 
 def test_a_searched_table_is_what_the_search_finds_and_keeps_to_its_condition() -> None:
-    cell = next(cell for cell in sweep.layout_cells(SMALL) if cell["condition"] == "Virtual Obstacle")
-    row = run.find_table(cell)
+    trial = next(trial for trial in sweep.layout_trials(SMALL) if trial["condition"] == "Virtual Obstacle")
+    row = run.find_table(trial)
     layout = TabletopLayout.from_json(row["json"])
     baseline = TabletopTask.named("columns").layout
     assert np.array_equal(layout.centres, baseline.centres)
     assert row["num_obstacles"] == len(layout.obstacles) > 0
     assert row["score"] == pytest.approx(TabletopWorkspace(condition="obstacles").summary(layout)["score"])
-    assert row == run.find_table(cell)
+    assert row == run.find_table(trial)
 
 
 def test_the_random_table_is_the_median_of_many() -> None:
-    cell = {"condition": "Random", "layout": 3, "initial": 101}
-    row = run.find_table(cell)
+    trial = {"condition": "Random", "layout": 3, "initial": 101}
+    row = run.find_table(trial)
     ws = TabletopWorkspace(condition="placement")
     scores = np.sort(ws.legibility(ws.sample(101, np.random.default_rng(3))))
     assert row["score"] == pytest.approx(scores[50])
@@ -125,21 +119,21 @@ def test_people_who_comply_or_not_are_the_same_people() -> None:
     ws = TabletopWorkspace(condition="obstacles")
     layout = ws.decode(ws.sample(5, np.random.default_rng(1))[np.argmax(ws.num_obstacles(
         ws.sample(5, np.random.default_rng(1))))])  # fmt: skip
-    cells = [
-        cell for cell in sweep.reading_cells(SMALL, [place("Both", layout)]) if cell["predictor"] == "nearest cube"
+    trials = [
+        trial for trial in sweep.accuracy_trials(SMALL, [place("Both", layout)]) if trial["predictor"] == "nearest cube"
     ]
-    good, bad = (run.simulate(cell) for cell in cells)
+    good, bad = (run.simulate(trial) for trial in trials)
     assert [(w.participant, w.goal, w.start) for w in good] == [(w.participant, w.goal, w.start) for w in bad]
     assert len(good) == 6 * SMALL.participants  # of eight reaches two have one goal only
     assert any(not np.array_equal(a.states, b.states) for a, b in zip(good, bad, strict=True))
 
 
 def test_reaches_behind_covariances_are_balanced_and_rows_are_their_moments() -> None:
-    cell = sweep.spread_cells(SMALL, [place()])[0]
-    rows = pd.DataFrame(run.spread_of_reaches(cell))
+    trial = sweep.spread_trials(SMALL, [place()])[0]
+    rows = pd.DataFrame(run.spread_of_reaches(trial))
     assert set(rows["reaches"]) == {SMALL.participants}
     assert rows.groupby(["alignment", "goal"]).size().eq(SMALL.samples).all()
-    reaches = run._balanced_reaches(cell)
+    reaches = run._balanced_reaches(trial)
     goal = reaches[0].goal
     ends = np.array([r.states[-1] - r.states[0] for r in reaches if r.goal == goal])
     last = rows[(rows["alignment"] == "none") & (rows["goal"] == goal)].iloc[-1]
@@ -147,9 +141,9 @@ def test_reaches_behind_covariances_are_balanced_and_rows_are_their_moments() ->
     assert [[last["xx"], last["xy"]], [last["xy"], last["yy"]]] == pytest.approx(np.cov(ends.T), abs=1e-12)
 
 
-def test_a_robot_that_reads_is_sure_earlier_than_one_that_does_not() -> None:
-    settings = dataclasses.replace(SMALL, participants=2, readers=(sweep.READERS[0], *sweep.READERS[2:]))
-    eq1, blind, alone = (pd.DataFrame(run.play_with_robot(cell)) for cell in sweep.team_cells(settings, [place()]))
+def test_a_robot_that_predicts_is_sure_earlier_than_one_that_does_not() -> None:
+    settings = dataclasses.replace(SMALL, participants=2, robots=(sweep.ROBOTS[0], *sweep.ROBOTS[2:]))
+    eq1, blind, alone = (pd.DataFrame(run.play_with_robot(trial)) for trial in sweep.team_trials(settings, [place()]))
     assert eq1["done"].eq(8).all()
     assert blind["decided"].eq(0).all()
     assert eq1["decision_fraction"].mean() < blind["decision_fraction"].mean() == 1
@@ -157,13 +151,13 @@ def test_a_robot_that_reads_is_sure_earlier_than_one_that_does_not() -> None:
     assert "conflicts" not in alone
 
 
-# -- judging ----------------------------------------------------------------------------------------------------------
+# -- evaluating -------------------------------------------------------------------------------------------------------
 
 
-def test_judged_rows_agree_with_one_another() -> None:
-    cell = sweep.reading_cells(SMALL, [place()])[0]
-    reaches = run.simulate(cell)
-    rows = pd.DataFrame(judged_rows(make_judge(sweep.PREDICTORS[3].how), reaches, folds=3, repeats=2, seed=1))
+def test_accuracy_rows_agree_with_one_another() -> None:
+    trial = sweep.accuracy_trials(SMALL, [place()])[0]
+    reaches = run.simulate(trial)
+    rows = pd.DataFrame(accuracy_rows(sweep.PREDICTORS[3].make(), reaches, folds=3, repeats=2, seed=1))
     parts = dict(list(rows.groupby("table")))
     means = [
         np.average(parts["accuracy"]["correct"], weights=parts["accuracy"]["walks"]),
@@ -175,7 +169,7 @@ def test_judged_rows_agree_with_one_another() -> None:
     assert confusion["count"].sum() == pytest.approx(len(reaches))
     hits = confusion[confusion["goal"] == confusion["predicted"]]["count"].sum()
     assert hits / len(reaches) == pytest.approx(means[0])
-    fewer = judged_rows(make_judge(sweep.PREDICTORS[3].how), reaches, folds=3, repeats=2, seed=1, starts=False,
+    fewer = accuracy_rows(sweep.PREDICTORS[3].make(), reaches, folds=3, repeats=2, seed=1, starts=False,
                         confusion_over="sum")  # fmt: skip
     others = by_table(pd.DataFrame(fewer))
     assert set(others) == {"accuracy", "metrics", "confusion"}
@@ -205,15 +199,19 @@ def test_logged_rows_come_back_with_every_name(tmp_path: Path) -> None:
 
 
 def test_learning_curves_begin_where_every_goal_is_known() -> None:
-    reaches = run.simulate(sweep.reading_cells(dataclasses.replace(SMALL, participants=8), [place()])[0])
-    rows = pd.DataFrame(curve_rows(make_judge(Judge("k-NN", "reach-knn").how), reaches, shares=(0.2, 1.0), repeats=3,
-                                   seed=0))  # fmt: skip
+    reaches = run.simulate(sweep.accuracy_trials(dataclasses.replace(SMALL, participants=8), [place()])[0])
+    rows = pd.DataFrame(curve_rows(PredictorSetting("k-NN", "reach-knn").make(), reaches, shares=(0.2, 1.0), repeats=3,
+                                   seed=0, rare="redraw"))  # fmt: skip
     assert rows.groupby("split")["share"].apply(list).tolist() == [[0.2, 1.0]] * 3
     whole, some = (rows[rows["share"] == share]["accuracy"].mean() for share in (1.0, 0.2))
     assert whole > some
     few = [reach for reach in reaches if len(reach.candidates) == 2]
     with pytest.raises(ValueError, match="mention every goal"):
-        curve_rows(make_judge(Judge("k-NN", "reach-knn").how), few, shares=(0.05,), repeats=1, seed=0)
+        curve_rows(PredictorSetting("k-NN", "reach-knn").make(), few, shares=(0.05,), repeats=1, seed=0, rare="redraw")
+    with pytest.raises(ValueError, match="single trajectories"):
+        learning_curve("reach-knn", reaches, groups="participant", rare="redraw")
+    with pytest.raises(ValueError, match="'error' or 'redraw', got 'keep'"):
+        learning_curve("reach-knn", reaches, rare="keep")  # type: ignore[arg-type]
 
 
 # -- the whole of it --------------------------------------------------------------------------------------------------
@@ -237,9 +235,11 @@ def test_nothing_runs_twice_and_the_analysis_repeats_itself(small_run: Path, pie
 
 def test_a_cell_that_is_lost_comes_back_the_same(small_run: Path) -> None:
     read = {path: json.loads(path.read_text()) for path in (small_run / "cells").iterdir()}
-    for name in ("read_people", "learn_people", "spread_of_reaches", "play_with_robot"):
-        content = next(content for content in read.values() if content["function"].endswith(f":{name}"))
-        again = getattr(run, name)(content["cell"])
+    functions = {"accuracy": run.evaluate_predictor, "curve": run.trace_learning_curve}
+    functions |= {"spread": run.spread_of_reaches, "team": run.play_with_robot}
+    for name, function in functions.items():
+        content = next(content for content in read.values() if content["function"] == f"tabletop/{name}")
+        again = function(content["cell"])
         plain = [{k: v for k, v in row.items() if v == v and v is not None} for row in again]
         kept = [{k: v for k, v in row.items() if v is not None} for row in content["rows"]]
         assert plain == kept
@@ -296,17 +296,18 @@ def test_words_follow_the_numbers() -> None:
                 for c, v in {"Random": 0.1, **values}.items()
             ]
         )
-        return narrative.agreement(tables.beside_published(metrics, ["A", "B"]), metrics, ["A", "B"])
+        return narrative.about_agreement(tables.beside_published(metrics, ["A", "B"]), metrics, ["A", "B"])
 
     paper = {name: known["f1"] for name, known in sweep.PUBLISHED.items()}
     same = rows(paper)
     assert "in the paper's order" in same
     assert "about as much as the paper's +0.232" in same
-    assert "2 read Both best" in same
+    assert "F1 is highest at Both for 2 of our 2 predictors (A, B), and in the paper's order" in same
+    assert "over all four conditions for 2 (A, B)" in same
     turned = rows({**paper, "Both": 0.1})
     assert "3 of 6 pairs in another order" in turned
     assert "less than the paper's" in turned
-    assert "0 read Both best of the four (none)" in turned
+    assert "F1 is highest at Both for 0 of our 2 predictors (none)" in turned
 
 
 def test_words_say_where_people_who_ignore_obstacles_cost_more_than_they_gain() -> None:
@@ -322,6 +323,14 @@ def test_words_say_where_people_who_ignore_obstacles_cost_more_than_they_gain() 
     text = narrative.about_compliance(table)
     assert "Virtual Obstacle goes from 0.900 to 0.700, below Placement from 50 % on" in text
     assert "Both goes from 0.950 to 0.910, never below Placement" in text
+
+
+def test_a_robot_without_prediction_is_known_in_earlier_results(results: tables.Results, tmp_path: Path) -> None:
+    for name in ("layouts", "curves", "spreads"):
+        getattr(results, name).to_csv(tmp_path / f"{name}.csv", index=False)
+    stacked(results.readings, "table").to_csv(tmp_path / "readings.csv", index=False)
+    results.teams.replace({"reader": {sweep.ALONE: "reads nothing"}}).to_csv(tmp_path / "teams.csv", index=False)
+    assert set(tables.load_results(tmp_path).teams["reader"]) == {"Eq. 1", sweep.NO_PREDICTION}
 
 
 def test_an_analysis_without_results_says_what_to_do(tmp_path: Path) -> None:

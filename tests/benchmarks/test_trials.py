@@ -1,4 +1,4 @@
-"""Cells: run once, in any order, on any number of processes, with the same results."""
+"""Trials: run once, in any order, on any number of processes, with the same results."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks.trials import CellsFailed, CellStore, Event, run_cells
+from benchmarks.trials import Event, TrialName, TrialsFailed, TrialStore, run_trials
 from legible_envs.overcooked import OvercookedWorkspace
 from optimizers import search
 from optimizers.evaluator import connect
-from tests.benchmarks import cell_functions
+from tests.benchmarks import trial_functions
 
-CELLS = [{"seed": seed, "settings": {"size": 3}, "shape": [7, 7]} for seed in range(5)]
+TRIALS = [{"seed": seed, "settings": {"size": 3}, "shape": [7, 7]} for seed in range(5)]
 
 
 def with_marks(folder: Path, n: int = 4, **more: object) -> list[dict[str, object]]:
@@ -35,7 +35,7 @@ def marks_of(folder: Path) -> list[str]:
 
 
 def test_rows_come_in_the_order_of_cells_with_their_settings(tmp_path: Path) -> None:
-    table = run_cells(cell_functions.draw, CELLS, tmp_path, workers=1)
+    table = run_trials(trial_functions.draw, TRIALS, tmp_path, workers=1)
     assert list(table.columns) == ["seed", "settings.size", "shape", "step", "value", "count"]
     assert table["seed"].tolist() == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4]
     assert table["shape"].unique().tolist() == ["[7, 7]"]
@@ -44,94 +44,116 @@ def test_rows_come_in_the_order_of_cells_with_their_settings(tmp_path: Path) -> 
 
 
 def test_the_number_of_workers_and_the_order_change_nothing(tmp_path: Path) -> None:
-    alone = run_cells(cell_functions.draw, CELLS, tmp_path / "a", workers=1)
-    many = run_cells("tests.benchmarks.cell_functions:draw", CELLS, tmp_path / "b", workers=3)
-    run_cells(cell_functions.draw, CELLS[::-1], tmp_path / "c", workers=1)
-    again = run_cells(cell_functions.draw, CELLS + CELLS, tmp_path / "c", workers=1)
+    alone = run_trials(trial_functions.draw, TRIALS, tmp_path / "a", workers=1)
+    many = run_trials("tests.benchmarks.trial_functions:draw", TRIALS, tmp_path / "b", workers=3)
+    run_trials(trial_functions.draw, TRIALS[::-1], tmp_path / "c", workers=1)
+    again = run_trials(trial_functions.draw, TRIALS + TRIALS, tmp_path / "c", workers=1)
     pd.testing.assert_frame_equal(alone, many)
     pd.testing.assert_frame_equal(alone, again)
 
 
 def test_finished_cells_are_not_run_again(tmp_path: Path) -> None:
-    cells = with_marks(tmp_path)
-    run_cells(cell_functions.draw_and_count, cells[:2], tmp_path, workers=1)
+    trials = with_marks(tmp_path)
+    run_trials(trial_functions.draw_and_count, trials[:2], tmp_path, workers=1)
     events: list[tuple[int, int]] = []
 
     def note(event: Event) -> None:
         events.append((event.found, event.done))
 
-    run_cells(cell_functions.draw_and_count, cells, tmp_path, workers=1, progress=note)
+    run_trials(trial_functions.draw_and_count, trials, tmp_path, workers=1, progress=note)
     assert marks_of(tmp_path) == ["0-0", "1-0", "2-0", "3-0"]
     assert events[0] == (2, 2)
     assert events[-1] == (2, 4)
 
 
 def test_a_damaged_result_is_computed_again(tmp_path: Path) -> None:
-    cells = with_marks(tmp_path, 2)
-    before = run_cells(cell_functions.draw_and_count, cells, tmp_path, workers=1)
+    trials = with_marks(tmp_path, 2)
+    before = run_trials(trial_functions.draw_and_count, trials, tmp_path, workers=1)
     victim = next((tmp_path / "cells").glob("*.json"))
     victim.write_text(victim.read_text()[:30])
-    after = run_cells(cell_functions.draw_and_count, cells, tmp_path, workers=1)
+    after = run_trials(trial_functions.draw_and_count, trials, tmp_path, workers=1)
     pd.testing.assert_frame_equal(before, after)
     assert len(marks_of(tmp_path)) == 3
 
 
 def test_a_failed_cell_is_retried_once_and_its_traceback_kept(tmp_path: Path) -> None:
-    cells = with_marks(tmp_path)
-    table = run_cells(cell_functions.fail_at_first, cells, tmp_path, workers=1)
+    trials = with_marks(tmp_path)
+    table = run_trials(trial_functions.fail_at_first, trials, tmp_path, workers=1)
     assert table["seed"].tolist() == [0, 1, 2, 3]
     assert marks_of(tmp_path) == ["0-0", "1-0", "1-1", "2-0", "3-0"]
-    assert CellStore(tmp_path, "any:thing").failures() == []
+    assert TrialStore(tmp_path, TrialName("any")).failures() == []
 
 
 def test_a_cell_that_fails_twice_costs_nothing_else(tmp_path: Path) -> None:
-    cells = with_marks(tmp_path)
-    with pytest.raises(CellsFailed, match=r"1 of 4 cells failed 2 times.*two is not allowed") as caught:
-        run_cells(cell_functions.always_fail_at_two, cells, tmp_path, workers=2)
+    trials = with_marks(tmp_path)
+    with pytest.raises(TrialsFailed, match=r"1 of 4 trials failed 2 times.*two is not allowed") as caught:
+        run_trials(trial_functions.always_fail_at_two, trials, tmp_path, workers=2)
     assert caught.value.table["seed"].tolist() == [0, 1, 3]
     (failure,) = caught.value.failures
     assert failure["cell"]["seed"] == 2
     assert failure["attempts"] == 2
     assert "RuntimeError: two is not allowed" in failure["traceback"]
-    with pytest.raises(CellsFailed):
-        run_cells(cell_functions.always_fail_at_two, cells, tmp_path, workers=1)
+    with pytest.raises(TrialsFailed):
+        run_trials(trial_functions.always_fail_at_two, trials, tmp_path, workers=1)
     assert marks_of(tmp_path) == ["0-0", "1-0", "2-0", "2-1", "2-2", "2-3", "3-0"]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs SIGKILL")
 def test_a_worker_that_dies_takes_only_its_cell_along(tmp_path: Path) -> None:
-    cells = with_marks(tmp_path)
-    table = run_cells(cell_functions.die_at_first, cells, tmp_path, workers=2)
+    trials = with_marks(tmp_path)
+    table = run_trials(trial_functions.die_at_first, trials, tmp_path, workers=2)
     assert table["seed"].tolist() == [0, 1, 2, 3]
     assert marks_of(tmp_path) == ["0-0", "1-0", "1-1", "2-0", "3-0"]
 
 
+def test_results_under_a_former_name_are_found_and_new_ones_kept_under_the_new(tmp_path: Path) -> None:
+    """A function that moves or is renamed keeps its finished trials."""
+    trials = with_marks(tmp_path, 3)
+    before = run_trials(trial_functions.draw_and_count, trials[:2], tmp_path, workers=1)
+    after = run_trials(trial_functions.draw_and_count_renamed, trials, tmp_path, workers=1)
+    assert marks_of(tmp_path) == ["0-0", "1-0", "2-0"]
+    pd.testing.assert_frame_equal(after.iloc[:2], before)
+    names = sorted(json.loads(path.read_text())["function"] for path in (tmp_path / "cells").iterdir())
+    assert names == ["tests.benchmarks.trial_functions:draw_and_count"] * 2 + ["tests/draw"]
+
+
+def test_a_failure_under_a_former_name_is_forgotten_with_the_next_attempt(tmp_path: Path) -> None:
+    (trial,) = with_marks(tmp_path, 1)
+    former, name = TrialName("before"), TrialName("now", ("before",))
+    TrialStore(tmp_path, former).save_failure(trial, "Error: then", 2, "it")
+    TrialStore(tmp_path, name).save_failure(trial, "Error: now", 2, "it")
+    assert [failure["function"] for failure in TrialStore(tmp_path, name).failures()] == ["now"]
+    TrialStore(tmp_path, former).save_failure(trial, "Error: then", 2, "it")
+    TrialStore(tmp_path, name).save(trial, [{"value": 1}], 0.1, "it")
+    assert TrialStore(tmp_path, name).failures() == []
+
+
 def test_values_that_are_not_finite_survive(tmp_path: Path) -> None:
     for _ in range(2):
-        table = run_cells(cell_functions.not_a_number, CELLS[:1], tmp_path, workers=1)
+        table = run_trials(trial_functions.not_a_number, TRIALS[:1], tmp_path, workers=1)
         assert np.isnan(table["value"][0])
         assert table["note"][0] == "none"
 
 
 def test_bad_functions_and_cells_are_named(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="plain JSON"):
-        run_cells(cell_functions.draw, [{"seed": np.zeros(2)}], tmp_path, workers=1)
+        run_trials(trial_functions.draw, [{"seed": np.zeros(2)}], tmp_path, workers=1)
     with pytest.raises(ValueError, match="plain JSON"):
-        run_cells(cell_functions.draw, [{"seed": float("nan")}], tmp_path, workers=1)
+        run_trials(trial_functions.draw, [{"seed": float("nan")}], tmp_path, workers=1)
     with pytest.raises(ValueError, match="top of a module"):
-        run_cells(lambda cell: {}, CELLS, tmp_path, workers=1)
+        run_trials(lambda trial: {}, TRIALS, tmp_path, workers=1)
     with pytest.raises(ValueError, match="top of a module"):
-        run_cells("tests.benchmarks.cell_functions:nobody", CELLS, tmp_path, workers=1)
-    with pytest.raises(CellsFailed, match="column 'value' of a result row holds a ndarray"):
-        run_cells(cell_functions.not_rows, CELLS[:1], tmp_path, workers=1)
+        run_trials("tests.benchmarks.trial_functions:missing", TRIALS, tmp_path, workers=1)
+    with pytest.raises(TrialsFailed, match="column 'value' of a result row holds a ndarray"):
+        run_trials(trial_functions.not_rows, TRIALS[:1], tmp_path, workers=1)
     with pytest.raises(ValueError, match="at least 1"):
-        run_cells(cell_functions.draw, CELLS, tmp_path / "x", workers=0)
+        run_trials(trial_functions.draw, TRIALS, tmp_path / "x", workers=0)
     (tmp_path / "file").touch()
     with pytest.raises(FileExistsError, match="is a file"):
-        run_cells(cell_functions.draw, CELLS, tmp_path / "file", workers=1)
+        run_trials(trial_functions.draw, TRIALS, tmp_path / "file", workers=1)
 
 
-def test_nobody_at_the_address_is_said() -> None:
+def test_a_missing_scheduler_is_named() -> None:
     pytest.importorskip("distributed")
     with pytest.raises(ConnectionError, match=r"no Dask scheduler answers at 'tcp://127.0.0.1:1'"):
         connect("tcp://127.0.0.1:1", timeout=0.5)
@@ -186,7 +208,7 @@ def test_a_cluster_loses_a_worker_and_no_result(
     cluster: tuple[str, list[subprocess.Popen[bytes]]], tmp_path: Path
 ) -> None:
     address, (victim, _) = cluster
-    cells = with_marks(tmp_path, 12, seconds=0.5)
+    trials = with_marks(tmp_path, 12, seconds=0.5)
     seen: set[str] = set()
 
     def kill_one(event: Event) -> None:
@@ -194,9 +216,9 @@ def test_a_cluster_loses_a_worker_and_no_result(
         if event.done >= 2 and len(seen) == 2 and victim.poll() is None:
             victim.send_signal(signal.SIGKILL)
 
-    table = run_cells(cell_functions.slowly, cells, tmp_path / "run", scheduler=address, progress=kill_one)
+    table = run_trials(trial_functions.slowly, trials, tmp_path / "run", scheduler=address, progress=kill_one)
     assert victim.wait(timeout=10) == -signal.SIGKILL
-    alone = run_cells(cell_functions.draw, [{"seed": seed} for seed in range(12)], tmp_path / "alone", workers=1)
+    alone = run_trials(trial_functions.draw, [{"seed": seed} for seed in range(12)], tmp_path / "alone", workers=1)
     assert table["value"].tolist() == alone[alone["step"] == 0]["value"].tolist()
     run = len(marks_of(tmp_path))
-    assert 12 <= run <= 14, "run twice at most: the cell it was running, and one whose result was on its way"
+    assert 12 <= run <= 14, "run twice at most: the trial it was running, and one whose result was on its way"

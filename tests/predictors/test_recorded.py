@@ -15,7 +15,7 @@ from benchmarks.experiments.prediction import (
     compare_with_reference,
     score_recorded_play,
 )
-from benchmarks.experiments.prediction.run import score_every_walk
+from benchmarks.experiments.prediction.run import score_every_trajectory
 from benchmarks.experiments.prediction.sweep import LAYOUTS, REFERENCE
 from legible_envs.datasets.overcooked_2019 import RecordingsError, recorded_trajectories
 from predictors import GridLogistic, GridNeighbours, GridNGram
@@ -82,8 +82,8 @@ def test_untrained_predictors_are_as_accurate_as_measured_before() -> None:
 @pytest.mark.data
 @needs_recordings
 def test_candidates_of_the_running_game_are_judged_apart() -> None:
-    rows = score_every_walk(layouts=("cramped_room",), fractions=(0.5,), candidate_set="game", repeats=1)
+    rows = score_every_trajectory(layouts=("cramped_room",), fractions=(0.5,), candidate_set="game", repeats=1)
     assert rows.attrs["candidate_set"] == "game"
     assert 0 < rows["trajectory"].nunique() < 424
-    with pytest.raises(ValueError, match="no walks to score"):
-        score_every_walk(layouts=("random0",))
+    with pytest.raises(ValueError, match="no trajectories to evaluate"):
+        score_every_trajectory(layouts=("random0",))

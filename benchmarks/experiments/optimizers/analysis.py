@@ -1,4 +1,4 @@
-"""Tables, figures and words from logged results alone."""
+"""Tables, figures and prose from logged results alone."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from benchmarks.experiments.optimizers import narrative
 from benchmarks.experiments.optimizers.figures import anytime_figure
 from benchmarks.experiments.optimizers.sweep import LOCAL_SEARCH, METHODS, OPTIMUM_5X5, OURS, PAPER_METHODS, PUBLISHED
 from benchmarks.reports.experiment_report import Section, write_tables
 from predictors.evaluation.figures import save_figure
-from predictors.evaluation.statistics import holm
+from predictors.evaluation.statistics import hedges_g, holm
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -62,18 +63,18 @@ def sections(folder: str | Path) -> list[Section]:
     return [
         Section(
             "What each search finds",
-            _best_in_words(board),
+            narrative.about_searches(board),
             {"Best score: mean (standard deviation) over searches": board, "At every budget": best},
             drawn,
         ),
         Section(
             "Are the differences luck?",
-            f"{_ours_in_words(ours)}\n\n{_TESTS}",
+            narrative.about_differences(ours),
             {f"`{OURS}` against `improve`": ours, "Pairs of methods": pairs},
         ),
-        Section("Optimality on 5x5", _gap_in_words(gap), {"Gap to the proven optimum": gap}),
-        Section("Beside a plain local search", _LOCAL, {f"Searches by `{OURS}`": local}),
-        Section("Beside the paper", _published_in_words(published), {"Ranks of the paper's methods": published}),
+        Section("Optimality on 5x5", narrative.about_optimum(gap), {"Gap to the proven optimum": gap}),
+        Section("Beside a plain local search", narrative.about_local_search(), {f"Searches by `{OURS}`": local}),
+        Section("Beside the paper", narrative.about_published(published), {"Ranks of the paper's methods": published}),
     ]
 
 
@@ -106,8 +107,9 @@ def pairwise(ends: pd.DataFrame) -> pd.DataFrame:
 
     Returns:
         Columns ``grid, budget, a, b, difference`` (of means, a - b), ``superiority`` (Vargha and Delaney's A: the
-        probability that a search by ``a`` ends better than one by ``b``, ties counting half), ``hedges_g`` (NaN without
-        any variance), ``p`` and ``p_holm`` (Holm's correction over all pairs at that grid and budget).
+        probability that a search by ``a`` ends better than one by ``b``, ties counting half), ``hedges_g``
+        (infinite or 0 where nothing varies, see :func:`predictors.evaluation.statistics.hedges_g`), ``p`` and
+        ``p_holm`` (Holm's correction over all pairs at that grid and budget).
     """
     import pandas as pd
     from scipy.stats import mannwhitneyu
@@ -163,17 +165,6 @@ def leaderboard(best: pd.DataFrame) -> pd.DataFrame:
         .reset_index()
         .assign(budget=budget)[["method", "budget", *table.columns]]
     )
-
-
-def hedges_g(x: np.ndarray[Any, Any], y: np.ndarray[Any, Any]) -> float:
-    """Difference of means in pooled standard deviations, corrected for small samples; NaN without any variance."""
-    freedom = len(x) + len(y) - 2
-    if freedom < 1:
-        return float("nan")
-    pooled = np.sqrt((((x - x.mean()) ** 2).sum() + ((y - y.mean()) ** 2).sum()) / freedom)
-    if pooled < 1e-12:
-        return float("nan")
-    return float((x.mean() - y.mean()) / pooled * (1 - 3 / (4 * freedom - 1)))
 
 
 def gaps(ends: pd.DataFrame) -> pd.DataFrame:
@@ -260,66 +251,3 @@ def _best_at(search: pd.DataFrame, at: np.ndarray[Any, Any]) -> np.ndarray[Any, 
     search = search.sort_values("scored")
     last = np.searchsorted(search["scored"].to_numpy(), at, side="right") - 1
     return search["best"].to_numpy()[np.maximum(last, 0)]
-
-
-# -- words ------------------------------------------------------------------------------------------------------------
-
-_TESTS = (
-    "Two-sided Mann-Whitney tests over seeds, Holm's correction over all pairs at a grid and budget. `superiority` is "
-    "Vargha and Delaney's A: the probability that one search by a ends better than one by b."
-)
-_LOCAL = (
-    "`local_search` is what steps that only ever accept better kitchens, started from random ones, reach in a million "
-    "evaluations; `reached` is the share of our searches, with their own budget, that do as well or better."
-)
-
-
-def _best_in_words(board: pd.DataFrame) -> str:
-    scored = (
-        "Every search at a budget scores the same number of layouts; the paper's budgets in iterations apart, where "
-        "this differs by orders of magnitude (see `scored`)."
-    )
-    if board.empty:
-        return scored
-    budget = f"{int(board['budget'].iloc[0]):,}"
-    return f"{scored} The first table shows {budget} evaluations, the largest budget that every method was given."
-
-
-def _ours_in_words(ours: pd.DataFrame) -> str:
-    counts = ours["verdict"].value_counts()
-    verdicts = ("better", "worse", "no difference shown")
-    said = ", ".join(f"{name} in {counts[name]}" for name in verdicts if name in counts)
-    return (
-        f"Our emitter (`{OURS}`) against the paper's (`improve`), a single test for each grid and budget at the 1 % "
-        f"level: {said or 'not run'} of {len(ours)}. Where both always find the same best layout nothing can be shown."
-    )
-
-
-def _gap_in_words(gap: pd.DataFrame) -> str:
-    if gap.empty:
-        return "The grid was not run."
-    said = []
-    for budget, part in gap.groupby("budget", sort=False):
-        named = part.loc[part["reached"] == 1.0, "method"].tolist()
-        names = "all methods" if len(named) == len(part) else ", ".join(named) or "none"
-        said.append(f"{_budget_in_words(str(budget))} by {names}")
-    return f"The best of all valid 5x5 kitchens scores {OPTIMUM_5X5:.6f}. Reached in every search: {'; '.join(said)}."
-
-
-def _budget_in_words(budget: str) -> str:
-    return "at the paper's iterations" if budget == "paper" else f"at {int(budget):,} evaluations"
-
-
-def _published_in_words(published: pd.DataFrame) -> str:
-    parts = []
-    for budget, part in published.groupby("budget", sort=False):
-        same = int((part["rank"] == part["published_rank"]).groupby(part["grid"]).all().sum())
-        grids = part["grid"].nunique()
-        parts.append(f"{_budget_in_words(str(budget))} the three methods rank as published on {same} of {grids} grids")
-    return (
-        "Units differ: the paper's best layouts lie near our random medians, so values cannot be compared, ranks can. "
-        f"Published: MAP-Elites before NSLC before DE everywhere. Here {'; '.join(parts)}. At equal iterations the "
-        "methods score very different numbers of layouts (`scored` in the summary), which alone "
-        "may decide the order; at equal evaluations this cannot be. The paper does not say how DE's vectors were "
-        "made layouts; here every vector is a valid one (random keys)."
-    )

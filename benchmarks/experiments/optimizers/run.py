@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final, Unpack
 
-from benchmarks.experiments.optimizers.sweep import FULL, QUICK, Settings, cells_of
-from benchmarks.reports.experiment_report import write_table
-from benchmarks.trials import Event, run_cells
+from benchmarks.experiments.optimizers.sweep import FULL, QUICK, Settings, trials_of
+from benchmarks.experiments.running import Rows, RunOptions, log_trials
+from benchmarks.trials import TrialName, trial_function
 
 if TYPE_CHECKING:
     from legible_envs.workspace import Workspace
 
-__all__ = ["reproduce", "run_cell"]
+__all__ = ["reproduce", "run_search"]
 
-Rows = list[dict[str, Any]]
-_SETTINGS = ("workspace", "iterations", "options", "evaluations")
+_HIDDEN: Final = ("workspace", "iterations", "options", "evaluations")
 
 
 def reproduce(
@@ -26,10 +24,8 @@ def reproduce(
     *,
     quick: bool = False,
     seeds: int | None = None,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    progress: Callable[[Event], object] | None = None,
     settings: Settings | None = None,
+    **how: Unpack[RunOptions],
 ) -> None:
     """Run what is not there yet, and write ``searches.csv``; tables and figures are made of it by ``sections``.
 
@@ -37,13 +33,11 @@ def reproduce(
         folder: Folder of the experiment.
         quick: Small grids, few seeds and small budgets.
         seeds: Searches of each kind, of large budgets at most as many as planned; None for those of the settings.
-        workers: See :func:`benchmarks.trials.run_cells`.
-        scheduler: See there.
-        progress: See there.
         settings: In place of the full or quick ones.
+        how: ``workers``, ``scheduler`` and ``progress`` of :func:`benchmarks.trials.run_trials`.
 
     Raises:
-        CellsFailed: Some cells failed; everything else is finished and on disk.
+        TrialsFailed: Some trials failed; everything else is finished and on disk.
         ValueError: Fewer than two seeds: nothing could be said about methods.
     """
     settings = settings or (QUICK if quick else FULL)
@@ -51,12 +45,11 @@ def reproduce(
         settings = settings.with_seeds(seeds)
     if settings.seeds < 2:
         raise ValueError(f"methods are compared by their searches: 2 seeds or more are needed, got {settings.seeds}")
-    folder = Path(folder)
-    found = run_cells(run_cell, cells_of(settings), folder, workers=workers, scheduler=scheduler, progress=progress)
-    write_table(folder / "searches.csv", found.drop(columns=[c for c in found if str(c).split(".")[0] in _SETTINGS]))
+    log_trials(run_search, trials_of(settings), Path(folder) / "searches.csv", hidden=_HIDDEN, **how)
 
 
-def run_cell(cell: dict[str, Any]) -> Rows:
+@trial_function(TrialName("optimizers/search", ("benchmarks.optimizer_comparison.run:run_cell",)))
+def run_search(trial: dict[str, Any]) -> Rows:
     """One search: a row for each logged moment, and one for its end.
 
     Columns: ``moment`` (``"running"`` or ``"end"``), ``scored`` layouts so far, ``best``, ``qd_score``, ``coverage``;
@@ -64,14 +57,14 @@ def run_cell(cell: dict[str, Any]) -> Rows:
     """
     from optimizers import search
 
-    iterations = cell["iterations"]
+    iterations = trial["iterations"]
     found = search(
-        _workspace(json.dumps(cell["workspace"])),
-        emitter=cell["method"],
-        emitter_options=cell["options"] or None,
-        evaluations=cell["evaluations"],
+        _workspace(json.dumps(trial["workspace"])),
+        emitter=trial["method"],
+        emitter_options=trial["options"] or None,
+        evaluations=trial["evaluations"],
         iterations=None if iterations is None else (iterations[0], iterations[1]),
-        seed=cell["seed"],
+        seed=trial["seed"],
         progress=False,
     )
     rows: Rows = [
@@ -80,7 +73,7 @@ def run_cell(cell: dict[str, Any]) -> Rows:
         for row in _thinned(found.history)
     ]
     if found.best_layout is None:
-        raise ValueError(f"no layout scored in {found.evaluations:,} evaluations of {json.dumps(cell)}")
+        raise ValueError(f"no layout scored in {found.evaluations:,} evaluations of {json.dumps(trial)}")
     rows.append(
         {
             "moment": "end",

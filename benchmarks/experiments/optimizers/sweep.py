@@ -6,7 +6,7 @@ import dataclasses
 import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 __all__ = [
     "FULL",
@@ -18,8 +18,8 @@ __all__ = [
     "PUBLISHED",
     "QUICK",
     "Settings",
-    "cells_of",
     "grid_name",
+    "trials_of",
 ]
 
 Shape = tuple[int, int]
@@ -111,18 +111,28 @@ def grid_name(shape: Shape) -> str:
     return f"{shape[0]}x{shape[1]}"
 
 
-def cells_of(settings: Settings) -> list[dict[str, Any]]:
-    """One cell per grid, budget, method and seed; those of small budgets first, so that a stop leaves whole tables."""
-    jobs: list[tuple[str, int | None, int, tuple[Shape, ...], tuple[str, ...]]] = []
+class _Job(NamedTuple):
+    """Every method on every grid, with so many seeds, at one budget; ``evaluations`` is None for the paper's."""
+
+    budget: str
+    evaluations: int | None
+    seeds: int
+    grids: tuple[Shape, ...]
+    methods: tuple[str, ...]
+
+
+def trials_of(settings: Settings) -> list[dict[str, Any]]:
+    """One trial per grid, budget, method and seed; those of small budgets first, so that a stop leaves whole tables."""
+    jobs: list[_Job] = []
     if settings.iterations:
-        jobs.append(("paper", None, settings.seeds, settings.grids, tuple(PAPER_BUDGETS)))
-    jobs += [(f"{n}", n, settings.seeds, settings.grids, METHODS) for n in settings.budgets]
-    jobs += [(f"{n}", n, seeds, (shape,), settings.large_methods) for n, shape, seeds in settings.large]
-    cells: dict[str, dict[str, Any]] = {}
+        jobs.append(_Job("paper", None, settings.seeds, settings.grids, tuple(PAPER_BUDGETS)))
+    jobs += [_Job(f"{n}", n, settings.seeds, settings.grids, METHODS) for n in settings.budgets]
+    jobs += [_Job(f"{n}", n, seeds, (shape,), settings.large_methods) for n, shape, seeds in settings.large]
+    trials: dict[str, dict[str, Any]] = {}
     for budget, evaluations, seeds, grids, methods in jobs:
         for shape, seed, method in itertools.product(grids, range(seeds), methods):
             how = PAPER_BUDGETS[method] if evaluations is None else {"iterations": None, "options": {}}
             workspace = {"workspace": "overcooked", "shape": list(shape), "prefix": settings.prefix}
-            cell = {"grid": grid_name(shape), "budget": budget, "method": method, "seed": seed}
-            cells[str(cell)] = {**cell, "workspace": workspace, "evaluations": evaluations, **how}
-    return list(cells.values())
+            trial = {"grid": grid_name(shape), "budget": budget, "method": method, "seed": seed}
+            trials[str(trial)] = {**trial, "workspace": workspace, "evaluations": evaluations, **how}
+    return list(trials.values())

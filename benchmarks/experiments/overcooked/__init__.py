@@ -1,4 +1,4 @@
-"""The paper's kitchens: are people in legible ones read better? Settings, run and analysis.
+"""The paper's kitchens: are goals in legible ones predicted better? Settings, run and analysis.
 
 Tung, Luebbers, Roncone and Hayes, *Workspace Optimization Techniques to Improve Prediction of Human Motion During
 Human-Robot Collaboration* (HRI 2024), the study in Overcooked, with simulated people fitted to recorded play.

@@ -1,4 +1,4 @@
-"""The settings of the experiment, as data, and the cells they make."""
+"""The settings of the experiment, as data, and the trials they make."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from benchmarks.experiments.trial_rows import Judge
+from benchmarks.experiments.predictor_settings import PredictorSetting
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,11 +23,11 @@ __all__ = [
     "QUICK",
     "WALKERS",
     "Settings",
-    "curve_cells",
-    "layout_cells",
-    "people_cells",
+    "accuracy_trials",
+    "curve_trials",
+    "fit_trials",
+    "layout_trials",
     "people_of",
-    "reading_cells",
 ]
 
 CONDITIONS: Final = ("Random", "Efficient", "Legible-Efficient", "Legible")
@@ -44,7 +44,8 @@ PUBLISHED: Final[Mapping[str, Mapping[str, float]]] = {
 """Tung et al. (HRI 2024), people in the Overcooked study: weighted means over goals."""
 
 PREFERENCE: Final = 0.2
-"""Spread of the log cost that each cell has for each person. An assumption: recorded walks are too few to fit it."""
+"""Spread of the log cost that each cell has for each person. An assumption: recorded trajectories are too few to fit
+it."""
 
 FITTED: Final[Mapping[str, Any]] = {
     "boltzmann": {"rationality": 1.236, "spread": 0.138},
@@ -63,17 +64,20 @@ FITTED: Final[Mapping[str, Any]] = {
 }  # fmt: skip
 """People for where the recordings are absent; what :mod:`.planner_fitting` fitted to them."""
 FITTED_SOURCE: Final = (
-    "2,406 walks of 34 people in four kitchens, Overcooked-AI's published games of 2019 (Carroll et al., NeurIPS 2019)"
+    "2,406 trajectories of 34 people in four kitchens, "
+    "Overcooked-AI's published games of 2019 (Carroll et al., NeurIPS 2019)"
 )
 
 PREDICTORS: Final = (
-    Judge("Eq. 1 (IRL costs)", "bayesian", {"cell_costs": "learned"}),
-    Judge("shortest distance", "shortest-distance", learns=False),
-    Judge("logistic", "grid-logistic"),
-    Judge("k-NN", "grid-knn"),
+    PredictorSetting("Eq. 1 (IRL costs)", "bayesian", {"cell_costs": "learned"}),
+    PredictorSetting("shortest distance", "shortest-distance", learns=False),
+    PredictorSetting("logistic", "grid-logistic"),
+    PredictorSetting("k-NN", "grid-knn"),
 )
 """The paper's two first."""
-NEURAL: Final = Judge("GRU", "recurrent", {"members": 2, "max_epochs": 40, "patience": 6, "device": "cpu"}, repeats=1)
+NEURAL: Final = PredictorSetting(
+    "GRU", "recurrent", {"members": 2, "max_epochs": 40, "patience": 6, "device": "cpu"}, max_repeats=1
+)
 
 
 @dataclass(frozen=True)
@@ -82,23 +86,23 @@ class Settings:
 
     Attributes:
         layouts: Layouts per condition, each searched with a seed of its own.
-        participants: Simulated people per layout and kind of walker; each cooks the task's three soups.
+        participants: Simulated participants per layout and kind of walker; each cooks the task's three soups.
         initial: Random layouts: what a search begins with, and what the median is taken of.
         improvements: Climbs of a search.
-        predictors: Whom to compare.
+        predictors: Which predictors to compare.
         folds: Of the cross-validation.
         repeats: Of the cross-validation.
-        shares: Of the walks not held out, learned from in learning curves.
+        shares: Of the trajectories not held out, learned from in learning curves.
         curve_repeats: Splits of the learning curves.
         shape: Rows and columns of the kitchens.
-        seed: Of the people and splits.
+        seed: Of the participants and splits.
     """
 
     layouts: int = 5
     participants: int = 20
     initial: int = 1000
     improvements: int = 1000
-    predictors: tuple[Judge, ...] = (*PREDICTORS, NEURAL)
+    predictors: tuple[PredictorSetting, ...] = (*PREDICTORS, NEURAL)
     folds: int = 4
     repeats: int = 3
     shares: tuple[float, ...] = (0.2, 0.4, 0.7, 1.0)
@@ -120,7 +124,7 @@ QUICK: Final = Settings(
 )
 
 
-def layout_cells(settings: Settings) -> list[dict[str, Any]]:
+def layout_trials(settings: Settings) -> list[dict[str, Any]]:
     """One search, or one draw of random layouts, for each layout."""
     return [
         {
@@ -135,20 +139,20 @@ def layout_cells(settings: Settings) -> list[dict[str, Any]]:
     ]
 
 
-def people_cells(walks: int) -> list[dict[str, Any]]:
-    """One fit for each kind of walker; with other recordings they are other cells.
+def fit_trials(recorded: int) -> list[dict[str, Any]]:
+    """One fit for each kind of walker; other recordings make other trials.
 
     Args:
-        walks: Recorded ones; 0 where there are no recordings, and no cells.
+        recorded: How many trajectories are recorded; 0 where there are no recordings, and then no trials.
     """
-    return [{"walker": walker, "recorded_walks": walks} for walker in WALKERS] if walks else []
+    return [{"walker": walker, "recorded_walks": recorded} for walker in WALKERS] if recorded else []
 
 
 def people_of(fits: pd.DataFrame) -> dict[str, dict[str, Any]]:
-    """People as plain data for cells, by kind of walker.
+    """People as plain data for trials, by kind of walker.
 
     Args:
-        fits: Rows of the people cells; empty where there are no recordings, which gives ``FITTED``.
+        fits: Rows of :func:`fit_trials`; empty where there are no recordings, which gives ``FITTED``.
     """
     found: dict[str, dict[str, Any]] = {}
     for walker in WALKERS:
@@ -166,41 +170,41 @@ def people_of(fits: pd.DataFrame) -> dict[str, dict[str, Any]]:
     return found
 
 
-def reading_cells(
+def accuracy_trials(
     settings: Settings, layouts: Sequence[Mapping[str, Any]], people: Mapping[str, Mapping[str, Any]]
 ) -> list[dict[str, Any]]:
-    """Every predictor on every kind of people in every layout.
+    """Every predictor on every kind of participant in every layout.
 
     Args:
         settings: The settings.
         layouts: ``condition``, ``layout`` (its number) and ``drawing``.
         people: As of :func:`people_of`.
     """
-    cells = []
+    trials = []
     for place in layouts:
         for walker, numbers in people.items():
-            for judge in settings.predictors:
-                extra = {"folds": settings.folds, "repeats": judge.repeats or settings.repeats}
-                cells.append(_with_people(settings, place, walker, numbers, judge) | extra)
-    return cells
+            for setting in settings.predictors:
+                extra = {"folds": settings.folds, "repeats": setting.repeats(settings.repeats)}
+                trials.append(_with_people(settings, place, walker, numbers, setting) | extra)
+    return trials
 
 
-def curve_cells(
+def curve_trials(
     settings: Settings, layouts: Sequence[Mapping[str, Any]], people: Mapping[str, Mapping[str, Any]]
 ) -> list[dict[str, Any]]:
-    """A learning curve of every predictor that learns, on the first kind of people."""
+    """A learning curve of every predictor that learns, on the first kind of participant."""
     walker = WALKERS[0]
     return [
-        _with_people(settings, place, walker, people[walker], judge)
-        | {"shares": list(settings.shares), "repeats": min(judge.repeats or 99, settings.curve_repeats)}
+        _with_people(settings, place, walker, people[walker], setting)
+        | {"shares": list(settings.shares), "repeats": setting.repeats(settings.curve_repeats)}
         for place in layouts
-        for judge in settings.predictors
-        if judge.learns
+        for setting in settings.predictors
+        if setting.learns
     ]
 
 
 def _with_people(
-    settings: Settings, place: Mapping[str, Any], walker: str, numbers: Mapping[str, Any], judge: Judge
+    settings: Settings, place: Mapping[str, Any], walker: str, numbers: Mapping[str, Any], setting: PredictorSetting
 ) -> dict[str, Any]:
     condition, number = str(place["condition"]), int(place["layout"])
     source = np.random.SeedSequence((settings.seed, CONDITIONS.index(condition), number, WALKERS.index(walker)))
@@ -208,8 +212,8 @@ def _with_people(
         "condition": condition,
         "layout": number,
         "walker": walker,
-        "predictor": judge.label,
-        "how": judge.how,
+        "predictor": setting.label,
+        "how": setting.how,
         "drawing": str(place["drawing"]),
         "people": dict(numbers),
         "participants": settings.participants,

@@ -35,7 +35,7 @@ class Results:
     Attributes:
         layouts: A row per layout.
         elites: A row per cell of the archive of each search.
-        fits: What was fitted to recorded people; empty where there were none.
+        fits: What was fitted to recorded people; empty without recordings.
         readings: ``accuracy``, ``metrics``, ``confusion`` and ``cost`` rows.
         curves: Learning curves.
     """
@@ -89,18 +89,18 @@ def best_layouts(results: Results) -> pd.DataFrame:
     return pd.concat(chosen, ignore_index=True)
 
 
-# -- how well people are read -----------------------------------------------------------------------------------------
+# -- how well goals are predicted -------------------------------------------------------------------------------------
 
 
 def accuracy_rows(results: Results, walker: str) -> pd.DataFrame:
-    """Per-participant rows of one kind of people, as :func:`.assess_hypotheses` takes them."""
+    """Per-participant rows of one kind of participant, as :func:`.assess_hypotheses` takes them."""
     rows = results.readings["accuracy"]
     columns = ["predictor", "condition", "layout", "participant", "fraction", "correct", "chance"]
     return rows[rows["walker"] == walker][columns].reset_index(drop=True)
 
 
 def metrics_table(results: Results) -> pd.DataFrame:
-    """Figures of merit per people, predictor and condition: means over fractions and layouts, and their spread."""
+    """Figures of merit per walker, predictor and condition: means over fractions and layouts, and their spread."""
     orders = {"walker": results.walkers, "predictor": results.predictors, "condition": CONDITIONS}
     return figures_of_merit(results.readings["metrics"], orders)
 
@@ -112,13 +112,13 @@ def beside_published(metrics: pd.DataFrame, predictor: str) -> pd.DataFrame:
 
 
 def anova_table(results: Results, best: pd.DataFrame) -> pd.DataFrame:
-    """Analyses of variance of each kind of people; see :func:`benchmarks.experiments.conditions.variance_rows`."""
+    """The rows of :func:`benchmarks.experiments.conditions.variance_rows`, for each kind of participant."""
     of = {walker: variance_rows(accuracy_rows(results, walker), results.predictors, best) for walker in results.walkers}
     return stacked(of, "walker")
 
 
 def hypotheses_of(results: Results) -> dict[str, Hypotheses]:
-    """H1 to H3 for legible layouts against random and efficient ones, for each kind of people."""
+    """H1 to H3 for legible layouts against random and efficient ones, for each kind of participant."""
     found = {}
     for walker in results.walkers:
         own = results.curves[results.curves["walker"] == walker] if len(results.curves) else None
@@ -133,6 +133,6 @@ def hypotheses_of(results: Results) -> dict[str, Hypotheses]:
 
 
 def confusion_of(results: Results, walker: str, predictor: str, condition: str, layout: int) -> pd.DataFrame:
-    """A square table of walks: true goals as rows, predicted ones as columns."""
+    """A square table of trajectories: true goals as rows, predicted ones as columns."""
     keys = {"walker": walker, "predictor": predictor, "condition": condition, "layout": layout}
     return confusion_matrix(results.readings["confusion"], **keys) / results.readings["accuracy"]["fraction"].nunique()

@@ -1,4 +1,4 @@
-"""How well predictors read the recorded play of real people: settings, run and analysis."""
+"""How well predictors predict the goals of real people in recorded play: settings, run and analysis."""
 
 import lazy_loader as lazy
 

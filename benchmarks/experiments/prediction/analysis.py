@@ -15,7 +15,7 @@ __all__ = ["accuracy_table", "compare_with_reference", "reference_rows", "summar
 
 
 def summarise(rows: pd.DataFrame) -> pd.DataFrame:
-    """Means over walks: the rows of :func:`benchmarks.experiments.prediction.run.score_recorded_play`."""
+    """Means over trajectories: the rows of :func:`benchmarks.experiments.prediction.run.score_recorded_play`."""
     scores = (
         rows.assign(chance=1.0 / rows["candidates"])
         .groupby(["layout", "predictor", "fraction"], sort=False)

@@ -8,40 +8,40 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from benchmarks.experiments.prediction.analysis import summarise
-from benchmarks.experiments.prediction.sweep import POINTING_PREDICTORS, Experiment, Setting
+from benchmarks.experiments.prediction.sweep import POINTING_PREDICTORS, Experiment
+from benchmarks.experiments.predictor_settings import PredictorSetting
 from legible_envs.datasets.overcooked_2019 import recorded_trajectories
 from legible_envs.datasets.pointing import load_pointing
 from legible_envs.rollouts.trajectory import CUTS
 from predictors.evaluation.cross_validation import evaluate
-from predictors.registry import make_predictor
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from predictors.base import GoalPredictor
 
-__all__ = ["score_every_walk", "score_pointing", "score_recorded_play"]
+__all__ = ["score_every_trajectory", "score_pointing", "score_recorded_play"]
 
 Tell = Callable[[str], None]
 
 
-def score_every_walk(
+def score_every_trajectory(
     folder: str | os.PathLike[str] | None = None,
     experiment: Experiment | None = None,
     *,
     tell: Tell | None = None,
     **changes: Any,
 ) -> pd.DataFrame:
-    """One row per predictor, repeat, recorded walk and fraction observed.
+    """One row per predictor, repeat, recorded trajectory and fraction observed.
 
-    Every walk is judged by predictors that have learned from other walks in the same kitchen (stratified
-    cross-validation; all predictors see the same splits).
+    The goal of every trajectory is predicted by predictors that have learned from others in the same kitchen
+    (stratified cross-validation; all predictors see the same splits).
 
     Args:
         folder: Where ``legible humans fetch`` wrote the recordings.
-        experiment: What is judged, and how.
+        experiment: What is evaluated, and how.
         tell: Called with what comes next, before it begins.
-        changes: Attributes of the experiment to change: ``score_every_walk(repeats=1)``.
+        changes: Attributes of the experiment to change: ``score_every_trajectory(repeats=1)``.
 
     Returns:
         The rows of :func:`predictors.evaluation.evaluate`: ``predictor``, ``repeat``, ``fold`` and the columns of
@@ -56,15 +56,15 @@ def score_every_walk(
     plan = replace(experiment or Experiment(), **changes)
     parts = []
     for layout in plan.layouts:
-        walks = recorded_trajectories(folder, [layout], plan.candidate_set)
-        if not walks:
+        trajectories = recorded_trajectories(folder, [layout], plan.candidate_set)
+        if not trajectories:
             continue
         for repeats, made in _by_repeats(plan.predictors, plan.repeats):
             if tell is not None:
                 tell(f"{layout}: {', '.join(made)}")
             found = evaluate(
                 made,
-                walks,
+                trajectories,
                 cv=plan.folds,
                 repeats=repeats,
                 fractions=plan.fractions,
@@ -74,20 +74,24 @@ def score_every_walk(
             )
             parts.append(found.table)
     if not parts:
-        raise ValueError(f"no walks to score in {list(plan.layouts)} with candidate set {plan.candidate_set!r}")
+        raise ValueError(
+            f"no trajectories to evaluate in {list(plan.layouts)} with candidate set {plan.candidate_set!r}"
+        )
     rows = pd.concat(parts, ignore_index=True)
     rows.attrs.update(cut=plan.cut, definition=CUTS[plan.cut], ties="fractional", candidate_set=plan.candidate_set)
     return rows
 
 
-def _by_repeats(settings: Sequence[Setting], repeats: int) -> Iterator[tuple[int, Mapping[str, GoalPredictor]]]:
-    """Predictors by label, neighbours together that are judged equally often."""
+def _by_repeats(
+    settings: Sequence[PredictorSetting], repeats: int
+) -> Iterator[tuple[int, Mapping[str, GoalPredictor]]]:
+    """Predictors by label, neighbours together that are evaluated equally often."""
     together: list[tuple[int, dict[str, GoalPredictor]]] = []
     for setting in settings:
-        own = min(repeats, setting.repeats or repeats)
+        own = setting.repeats(repeats)
         if not together or together[-1][0] != own:
             together.append((own, {}))
-        together[-1][1][setting.label] = make_predictor(setting.predictor, **setting.parameters)
+        together[-1][1][setting.label] = setting.make()
     return iter(together)
 
 
@@ -98,30 +102,32 @@ def score_recorded_play(
     tell: Tell | None = None,
     **changes: Any,
 ) -> pd.DataFrame:
-    """Accuracy of each predictor in each recorded kitchen against fraction observed; see :func:`score_every_walk`.
+    """Accuracy of each predictor in each recorded kitchen against fraction observed.
+
+    Arguments are those of :func:`score_every_trajectory`.
 
     Returns:
         Tidy rows ``layout, predictor, fraction, accuracy, chance, walks, participants, repeats``: accuracy is the mean
-        over walks with ties shared out, chance that of guessing among the candidates. ``.attrs`` holds ``cut``,
+        over trajectories with ties shared out, chance that of guessing among the candidates. ``.attrs`` holds ``cut``,
         ``definition`` (of fraction observed, in words), ``ties`` and ``candidate_set``.
     """
-    return summarise(score_every_walk(folder, experiment, tell=tell, **changes))
+    return summarise(score_every_trajectory(folder, experiment, tell=tell, **changes))
 
 
 def score_pointing(
     path: str | os.PathLike[str],
     *,
-    predictors: Sequence[Setting] = POINTING_PREDICTORS,
+    predictors: Sequence[PredictorSetting] = POINTING_PREDICTORS,
     folds: int = 4,
     seed: int = 0,
     tell: Tell | None = None,
 ) -> pd.DataFrame:
-    """Accuracy of each predictor on real pointing by people of whom it has seen nothing.
+    """Accuracy of each predictor on real pointing of participants it has not learned from.
 
     Args:
         path: The file of :func:`legible_envs.datasets.pointing.load_pointing`.
-        predictors: Whom to compare.
-        folds: How many parts the people are split into.
+        predictors: Which predictors to compare.
+        folds: How many parts the participants are split into.
         seed: Of the split.
         tell: Called with what comes next, before it begins.
 
@@ -134,12 +140,12 @@ def score_pointing(
     """
     import pandas as pd
 
-    walks = load_pointing(path)
+    trajectories = load_pointing(path)
     parts = []
     for repeats, made in _by_repeats(predictors, 1):
         if tell is not None:
             tell(f"pointing: {', '.join(made)}")
-        parts.append(evaluate(made, walks, cv=folds, repeats=repeats, groups="participant", seed=seed).table)
+        parts.append(evaluate(made, trajectories, cv=folds, repeats=repeats, groups="participant", seed=seed).table)
     rows = pd.concat(parts, ignore_index=True).assign(layout="pointing")
     rows.attrs.update(parts[0].attrs)
     return summarise(rows)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any, Final, Literal
+from dataclasses import dataclass
+from typing import Final, Literal
 
+from benchmarks.experiments.predictor_settings import PredictorSetting
 from legible_envs.rollouts.trajectory import Cut
 from predictors.base import FRACTIONS
 
@@ -19,49 +20,31 @@ __all__ = [
     "REFERENCE",
     "UNTRAINED",
     "Experiment",
-    "Setting",
 ]
 
 
-@dataclass(frozen=True)
-class Setting:
-    """One predictor of the comparison.
-
-    Attributes:
-        label: What tables call it.
-        predictor: Its name, or ``"module:Class"``.
-        parameters: Its parameters.
-        repeats: Most repeats of the cross-validation, for those that take minutes; None: no limit.
-    """
-
-    label: str
-    predictor: str
-    parameters: Mapping[str, Any] = field(default_factory=dict)
-    repeats: int | None = None
-
-
 LAYOUTS: Final = ("asymmetric_advantages", "coordination_ring", "cramped_room", "random3")
-"""Recorded kitchens in which people walk to dispensers; in ``random0`` these are handed across a counter."""
+"""Recorded kitchens in which people walk to dispensers; in ``random0`` ingredients are handed across a counter."""
 
 UNTRAINED: Final = (
-    Setting("shortest distance", "shortest-distance", {"metric": "manhattan"}),
-    Setting("Eq. 1", "bayesian", {"beta": 1.0}),
+    PredictorSetting("shortest distance", "shortest-distance", {"metric": "manhattan"}),
+    PredictorSetting("Eq. 1", "bayesian", {"beta": 1.0}),
 )
-"""Predictors that learn nothing from walks."""
+"""Predictors that learn nothing from trajectories."""
 
 PREDICTORS: Final = (
     *UNTRAINED,
-    Setting("Eq. 1 (soft costs)", "bayesian", {"beta": 1.0, "costs": "soft"}),
-    Setting("Eq. 1 (soft costs, prior)", "bayesian", {"beta": 1.0, "costs": "soft", "prior": "empirical"}),
-    Setting("MaxEnt IRL", "maxent-irl"),
-    Setting("MaxEnt IRL with prior", "maxent-irl", {"prior": "empirical"}),
-    Setting("n-gram", "grid-ngram"),
-    Setting("k-NN", "grid-knn"),
-    Setting("logistic", "grid-logistic"),
+    PredictorSetting("Eq. 1 (soft costs)", "bayesian", {"beta": 1.0, "costs": "soft"}),
+    PredictorSetting("Eq. 1 (soft costs, prior)", "bayesian", {"beta": 1.0, "costs": "soft", "prior": "empirical"}),
+    PredictorSetting("MaxEnt IRL", "maxent-irl"),
+    PredictorSetting("MaxEnt IRL with prior", "maxent-irl", {"prior": "empirical"}),
+    PredictorSetting("n-gram", "grid-ngram"),
+    PredictorSetting("k-NN", "grid-knn"),
+    PredictorSetting("logistic", "grid-logistic"),
 )
-"""Everyone; "with prior" means that goals are expected as often as they were chosen in training walks."""
+"""All of them; "with prior" means that goals are expected as often as they were chosen in training trajectories."""
 
-NEURAL: Final = (Setting("GRU", "recurrent"), Setting("Transformer", "transformer", repeats=1))
+NEURAL: Final = (PredictorSetting("GRU", "recurrent"), PredictorSetting("Transformer", "transformer", max_repeats=1))
 """Learned networks, whose fitting needs torch."""
 
 REFERENCE: Final[Mapping[str, tuple[float, float, float, float]]] = {
@@ -77,20 +60,20 @@ REFERENCE: Final[Mapping[str, tuple[float, float, float, float]]] = {
 """Mean accuracy over 10..90 % in each of ``LAYOUTS``, measured before with other implementations of the same ideas."""
 
 POINTING_PREDICTORS: Final = (
-    Setting("nearest target", "shortest-distance", {"metric": "euclidean"}),
-    Setting("Eq. 1, straight lines", "reach-bayesian"),
-    Setting("Gaussian, open-end", "reach-gaussian"),
-    Setting("Gaussian, index", "reach-gaussian", {"online": "index"}),
-    Setting("Gaussian with velocity, open-end", "reach-gaussian", {"velocity": True}),
-    Setting("Gaussian with velocity, index", "reach-gaussian", {"velocity": True, "online": "index"}),
-    Setting("Gaussian with velocity, newest sample", "reach-gaussian", {"velocity": True, "half_life": 0.0}),
-    Setting("logistic", "reach-logistic"),
-    Setting("logistic, degree 2", "reach-logistic", {"degree": 2}),
-    Setting("k-NN", "reach-knn"),
+    PredictorSetting("nearest target", "shortest-distance", {"metric": "euclidean"}),
+    PredictorSetting("Eq. 1, straight lines", "reach-bayesian"),
+    PredictorSetting("Gaussian, open-end", "reach-gaussian"),
+    PredictorSetting("Gaussian, index", "reach-gaussian", {"online": "index"}),
+    PredictorSetting("Gaussian with velocity, open-end", "reach-gaussian", {"velocity": True}),
+    PredictorSetting("Gaussian with velocity, index", "reach-gaussian", {"velocity": True, "online": "index"}),
+    PredictorSetting("Gaussian with velocity, newest sample", "reach-gaussian", {"velocity": True, "half_life": 0.0}),
+    PredictorSetting("logistic", "reach-logistic"),
+    PredictorSetting("logistic, degree 2", "reach-logistic", {"degree": 2}),
+    PredictorSetting("k-NN", "reach-knn"),
 )
-"""Whom to compare on real pointing."""
+"""Predictors to compare on real pointing."""
 
-POINTING_NEURAL: Final = (Setting("GRU", "recurrent"), Setting("Transformer", "transformer"))
+POINTING_NEURAL: Final = (PredictorSetting("GRU", "recurrent"), PredictorSetting("Transformer", "transformer"))
 
 POINTING_REFERENCE: Final[Mapping[str, float]] = {
     "nearest target": 0.754,
@@ -106,21 +89,21 @@ POINTING_REFERENCE: Final[Mapping[str, float]] = {
 
 @dataclass(frozen=True)
 class Experiment:
-    """What is judged on recorded play, and how.
+    """What is evaluated on recorded play, and how.
 
     Attributes:
-        predictors: Whom to compare.
+        predictors: Which predictors to compare.
         layouts: Kitchens, by the names they have in the recordings.
         fractions: Fractions observed.
         cut: Fraction of what; see :data:`legible_envs.rollouts.CUTS`.
         candidate_set: Which goals count as possible; see
             :func:`legible_envs.datasets.overcooked_2019.recorded_trajectories`.
-        folds: How many parts the walks are split into.
+        folds: How many parts the trajectories are split into.
         repeats: How often, with other splits.
         seed: Of the splits.
     """
 
-    predictors: Sequence[Setting] = PREDICTORS
+    predictors: Sequence[PredictorSetting] = PREDICTORS
     layouts: Sequence[str] = LAYOUTS
     fractions: Sequence[float] = FRACTIONS
     cut: Cut = "cells"

@@ -1,4 +1,4 @@
-"""Tables, figures and words from logged results alone."""
+"""Tables, figures and prose from logged results alone."""
 
 from __future__ import annotations
 
@@ -10,12 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks.experiments.recorded.sweep import BOOTSTRAPS, MIN_WALKS
+from benchmarks.experiments.trial_rows import logged_rows
 from benchmarks.reports.experiment_report import Section, write_tables
+from predictors.evaluation.rank_correlation import detectable, spearman, spearman_rows
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["correlate", "detectable", "places_of", "sections", "spearman"]
+__all__ = ["correlate", "places_of", "sections"]
 
 Floats = npt.NDArray[np.float64]
 Level = Literal["stage", "reach"]
@@ -35,9 +37,10 @@ def sections(folder: str | Path, *, bootstraps: int = BOOTSTRAPS) -> list[Sectio
     import pandas as pd
 
     from benchmarks.experiments.recorded.figures import draw_all
+    from benchmarks.experiments.recorded.narrative import about_correlations
 
     folder = Path(folder)
-    scores, readings = (_read(folder / f"{name}.csv") for name in ("scores", "readings"))
+    scores, readings = (logged_rows(folder, name, "overcooked").fillna({"goal": ""}) for name in ("scores", "readings"))
     places = {level: places_of(scores, readings, level) for level in LEVELS}
     correlations = pd.concat(
         [correlate(scores, readings, level, bootstraps=bootstraps).assign(level=level) for level in LEVELS],
@@ -51,21 +54,12 @@ def sections(folder: str | Path, *, bootstraps: int = BOOTSTRAPS) -> list[Sectio
     figures = draw_all(places["stage"], correlations, folder / "figures")
     return [
         Section(
-            "Recorded people: does the score say how predictable people are?",
-            _words(correlations, places["stage"]),
+            "Recorded people: does the score tell how predictable they are?",
+            about_correlations(correlations),
             {"Rank correlation of legibility with accuracy": correlations, "By kitchen": kitchens},
             figures,
         )
     ]
-
-
-def _read(path: Path) -> pd.DataFrame:
-    import pandas as pd
-
-    if not path.is_file():
-        raise FileNotFoundError(f"{path} is missing; run the experiment on recorded people first")
-    table = pd.read_csv(path)
-    return table.assign(goal=table["goal"].fillna(""))
 
 
 # -- places -----------------------------------------------------------------------------------------------------------
@@ -78,11 +72,12 @@ def places_of(scores: pd.DataFrame, readings: pd.DataFrame, level: Level, min_wa
         scores: As logged.
         readings: As logged.
         level: A row per ``"stage"`` (start and set of goals) or per ``"reach"`` (the goal, too).
-        min_walks: Places with fewer walks are left out.
+        min_walks: Places with fewer recorded trajectories are left out.
 
     Returns:
-        ``candidate_set, kitchen, start, goals`` (and ``goal``), ``predictor, candidates, walks, participants, score,
-        accuracy, skill``; skill is the accuracy above guessing among the candidates, 1 if always right.
+        ``candidate_set, kitchen, start, goals`` (and ``goal``), ``predictor, candidates, walks`` (trajectories),
+        ``participants, score, accuracy, skill``; skill is the accuracy above guessing among the candidates, 1 if always
+        right.
     """
     keys = _keys(level)
     own = scores[scores["goal"] == ""] if level == "stage" else scores[scores["goal"] != ""]
@@ -107,7 +102,7 @@ def _skill(accuracy: Floats, candidates: Floats) -> Floats:
 
 
 def _kitchens(stages: pd.DataFrame) -> pd.DataFrame:
-    """Means of stages by kitchen, each stage counting as often as it was walked in: four kitchens are no sample."""
+    """Means of stages by kitchen, each stage weighted by its trajectories: four kitchens are too few for a sample."""
     parts = stages.assign(**{f"_{name}": stages[name] * stages["walks"] for name in ("score", "accuracy", "skill")})
     sums = parts.groupby(["candidate_set", "kitchen", "predictor"], sort=False)[
         ["walks", "_score", "_accuracy", "_skill"]
@@ -120,45 +115,16 @@ def _kitchens(stages: pd.DataFrame) -> pd.DataFrame:
 # -- correlation ------------------------------------------------------------------------------------------------------
 
 
-def spearman(x: Floats, y: Floats) -> float:
-    """Spearman's rank correlation, ties averaged; NaN where one side does not vary or there are fewer than three."""
-    return float(spearman_rows(x[None], y[None])[0])
-
-
-def spearman_rows(x: Floats, y: Floats) -> Floats:
-    """``(k,)`` :func:`spearman` of each row of ``x (k, n)`` with that of ``y (k, n)``."""
-    from scipy.stats import rankdata
-
-    if x.shape[1] < 3:
-        return np.full(len(x), np.nan)
-    a, b = (rankdata(values, axis=1) - (x.shape[1] + 1) / 2 for values in (x, y))
-    spread = np.sqrt((a**2).sum(axis=1) * (b**2).sum(axis=1))
-    varies = spread > 0
-    return np.where(varies, (a * b).sum(axis=1) / np.where(varies, spread, 1.0), np.nan)
-
-
-def detectable(n: int, power: float = 0.8, alpha: float = 0.05) -> float:
-    """The rank correlation that a two-sided test on ``n`` pairs finds with a given power.
-
-    By Fisher's z with the variance 1.06 / (n - 3) of ranks (Fieller, Hartley and Pearson, 1957); NaN for ``n < 5``.
-    """
-    from scipy.stats import norm
-
-    if n < 5:
-        return float("nan")
-    return float(np.tanh((norm.ppf(1 - alpha / 2) + norm.ppf(power)) * np.sqrt(1.06 / (n - 3))))
-
-
 def correlate(
     scores: pd.DataFrame, readings: pd.DataFrame, level: Level, *, bootstraps: int = BOOTSTRAPS, seed: int = 0
 ) -> pd.DataFrame:
-    """Rank correlations of legibility with accuracy, with intervals over people and over places.
+    """Rank correlations of legibility with accuracy, with intervals over participants and over places.
 
     Args:
         scores: As logged.
         readings: As logged.
-        level: See :func:`places_of`.
-        bootstraps: Resamples: of people, whose walks go together; and of places.
+        level: ``"stage"`` or ``"reach"``, as for :func:`places_of`.
+        bootstraps: Resamples: of participants, whose trajectories go together; and of places.
         seed: Of the resamples.
 
     Returns:
@@ -204,7 +170,7 @@ def correlate(
 
 
 def _by_person(readings: pd.DataFrame, places: pd.DataFrame, keys: Sequence[str]) -> tuple[Floats, Floats]:
-    """``(places, people)`` right predictions and walks."""
+    """Right predictions and numbers of trajectories, each ``(places, participants)``."""
     weighted = readings.assign(hits=readings["correct"] * readings["walks"])
     index = places.set_index(list(keys)).index
     tables = [
@@ -219,7 +185,7 @@ def _by_person(readings: pd.DataFrame, places: pd.DataFrame, keys: Sequence[str]
 def _resampled(
     hits: Floats, walks: Floats, score: Floats, bootstraps: int, rng: np.random.Generator
 ) -> tuple[Floats, npt.NDArray[np.intp]]:
-    """``(bootstraps,)`` correlations with people drawn anew, and ``(bootstraps, places)`` draws of places."""
+    """``(bootstraps,)`` correlations with participants drawn anew, and ``(bootstraps, places)`` draws of places."""
     people, number = hits.shape[1], np.empty((bootstraps, hits.shape[1]))
     lots = np.empty((bootstraps, len(score)), dtype=np.intp)
     for i in range(bootstraps):
@@ -227,7 +193,7 @@ def _resampled(
         lots[i] = rng.integers(len(score), size=len(score))
     right, count = number @ hits.T, number @ walks.T
     found = np.full(bootstraps, np.nan)
-    # Where nobody drawn was ever at a place, it does not count.
+    # A place counts only where some participant drawn has been.
     for seen in np.unique(count > 0, axis=0):
         rows = ((count > 0) == seen).all(axis=1)
         shares = right[np.ix_(rows, seen)] / count[np.ix_(rows, seen)]
@@ -245,47 +211,3 @@ def _interval(name: str, values: Floats) -> dict[str, float]:
     known = values[~np.isnan(values)]
     low, high = np.percentile(known, [2.5, 97.5]) if len(known) else (np.nan, np.nan)
     return {f"{name}_low": float(low), f"{name}_high": float(high)}
-
-
-# -- words ------------------------------------------------------------------------------------------------------------
-
-
-def _words(correlations: pd.DataFrame, stages: pd.DataFrame) -> str:
-    parts = [
-        "Nobody designed the recorded kitchens to be read. If the score means anything for real people, stages (a "
-        "start and the goals that count as possible there) that score higher should be read better. The score of a "
-        "stage is Eq. 2 averaged over its goals and all prefixes of shortest walks; accuracy is the mean over 10 to "
-        f"90 % of a walk. Stages with fewer than {MIN_WALKS} walks are left out. There are four kitchens only, too few "
-        "to correlate; their means stand in the table."
-    ]
-    for candidate_set, own in correlations.groupby("candidate_set", sort=False):
-        kind = "every dispenser in reach is a goal" if candidate_set == "all" else "goals of use in the running game"
-        for level, part in own.groupby("level", sort=False):
-            parts.append(_verdict(f"{kind}, stage level" if level == "stage" else f"{kind}, goal by goal", part))
-    return "\n\n".join(parts)
-
-
-def _verdict(what: str, part: pd.DataFrame) -> str:
-    found = part[(part["places_low"] > 0) & (part["people_low"] > 0)]
-    against = part[part["places_high"] < 0]
-    above = part[part["skill_low"] > 0]
-    rows: list[dict[str, Any]] = [{str(k): v for k, v in row.items()} for row in part.to_dict("records")]
-    values = ", ".join(
-        f"{row['predictor']} {row['rho']:+.2f} [{row['places_low']:+.2f}, {row['places_high']:+.2f}]" for row in rows
-    )
-    if len(found) == len(part):
-        answer = "yes, for every predictor"
-    elif len(found):
-        answer = f"for {', '.join(found['predictor'])}, not for the others"
-    else:
-        answer = "no, not shown for any predictor"
-    if len(against):
-        answer += f"; the reverse for {', '.join(against['predictor'])}"
-    said = f"for {', '.join(above['predictor'])}" if len(above) else "for none"
-    return (
-        f"{what[0].upper()}{what[1:]}: {answer}. Rank correlations [95 % over places]: {values}. Beyond what the "
-        f"number of goals explains (correlation with accuracy above chance), it is shown {said}. "
-        f"Within kitchens the correlations are {part['rho_within'].min():+.2f} to {part['rho_within'].max():+.2f}. "
-        f"With {int(part['places'].min())} places only correlations of {part['detectable'].max():.2f} or more are "
-        "found with a power of 80 %."
-    )

@@ -1,23 +1,21 @@
-"""Scoring the stages of recorded play, and reading the people in them."""
+"""Scoring the stages of recorded play, and predicting the goals of the people in them."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
-from benchmarks.experiments.recorded.sweep import FULL, QUICK, Settings, reading_cells, score_cells
-from benchmarks.reports.experiment_report import write_table
-from benchmarks.trials import Event, run_cells
+from benchmarks.experiments.predictor_settings import predictor_from
+from benchmarks.experiments.recorded.sweep import FULL, QUICK, Settings, accuracy_trials, score_trials
+from benchmarks.experiments.running import Rows, RunOptions, log_trials
+from benchmarks.trials import TrialName, trial_function
 
 if TYPE_CHECKING:
     from legible_envs.rollouts.trajectory import Trajectory
 
-__all__ = ["read_stages", "reproduce", "score_stages"]
-
-Rows = list[dict[str, Any]]
+__all__ = ["evaluate_by_stage", "reproduce", "score_stages"]
 
 
 def reproduce(
@@ -25,10 +23,8 @@ def reproduce(
     *,
     quick: bool = False,
     seeds: int | None = None,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    progress: Callable[[Event], object] | None = None,
     settings: Settings | None = None,
+    **how: Unpack[RunOptions],
 ) -> None:
     """Run what is not there yet, and write ``scores.csv`` and ``readings.csv``; ``sections`` makes tables and figures.
 
@@ -36,59 +32,53 @@ def reproduce(
         folder: Folder of the experiment.
         quick: Fewer predictors, one split.
         seeds: Repeats of the cross-validation; None for those of the settings.
-        workers: See :func:`benchmarks.trials.run_cells`.
-        scheduler: See there.
-        progress: See there.
         settings: In place of the full or quick ones.
+        how: ``workers``, ``scheduler`` and ``progress`` of :func:`benchmarks.trials.run_trials`.
 
     Raises:
         RecordingsError: The recordings are not there; the message says how to get them.
-        CellsFailed: Some cells failed; everything else is finished and on disk.
+        TrialsFailed: Some trials failed; everything else is finished and on disk.
     """
     from legible_envs.datasets.overcooked_2019 import recorded_trajectories
 
     settings = settings or (QUICK if quick else FULL)
     if seeds is not None:
         settings = dataclasses.replace(settings, repeats=seeds)
-    folder = Path(folder)
-    walks = len(recorded_trajectories())
-    parts: tuple[tuple[str, Callable[[dict[str, Any]], Rows], Rows], ...] = (
-        ("scores", score_stages, score_cells(settings, walks)),
-        ("readings", read_stages, reading_cells(settings, walks)),
-    )
-    for name, function, cells in parts:
-        found = run_cells(function, cells, folder, workers=workers, scheduler=scheduler, progress=progress)
-        write_table(folder / f"{name}.csv", found.drop(columns=[c for c in found if str(c).startswith("how.")]))
+    folder, count = Path(folder), len(recorded_trajectories())
+    log_trials(score_stages, score_trials(settings, count), folder / "scores.csv", **how)
+    log_trials(evaluate_by_stage, accuracy_trials(settings, count), folder / "readings.csv", **how)
 
 
-def _walks(cell: dict[str, Any]) -> list[Trajectory]:
+def _recorded(trial: dict[str, Any]) -> list[Trajectory]:
     from legible_envs.datasets.overcooked_2019 import recorded_trajectories
 
-    return recorded_trajectories(layouts=[cell["kitchen"]], candidate_set=cell["candidate_set"])
+    return recorded_trajectories(layouts=[trial["kitchen"]], candidate_set=trial["candidate_set"])
 
 
-def _stage(walk: Trajectory) -> dict[str, Any]:
-    return {"start": walk.start, "goals": " ".join(sorted(walk.candidates)), "goal": walk.goal}
+def _stage(trajectory: Trajectory) -> dict[str, Any]:
+    goals = " ".join(sorted(trajectory.candidates))
+    return {"start": trajectory.start, "goals": goals, "goal": trajectory.goal}
 
 
-def score_stages(cell: dict[str, Any]) -> Rows:
-    """Eq. 2 of every reach that somebody was recorded to make, expected over shortest walks and their prefixes.
+@trial_function(TrialName("recorded/score", ("benchmarks.recorded_people.run:score_stages",)))
+def score_stages(trial: dict[str, Any]) -> Rows:
+    """Legibility (Eq. 2) of every recorded stage and goal, expected over shortest paths and their prefixes.
 
     Returns:
-        Rows ``start, goals`` (the stage), ``goal, walks, score``; and with an empty ``goal`` the mean over the goals of
-        the stage, as in Eq. 3, walked to or not.
+        Rows ``start, goals`` (the stage), ``goal, walks`` (how many were recorded), ``score``; and with an empty
+        ``goal`` the mean over all goals of the stage, as in Eq. 3.
     """
     from legible_envs.legibility import From, goal_legibility
     from legible_envs.overcooked.layout import OvercookedLayout
     from legible_envs.overcooked.scoring.explanation import grid_graph
 
-    walks = _walks(cell)
-    layout = walks[0].layout
-    assert isinstance(layout, OvercookedLayout)  # recorded people walked in kitchens
+    trajectories = _recorded(trial)
+    layout = trajectories[0].layout
+    assert isinstance(layout, OvercookedLayout)
     graph = grid_graph(layout)
     stages: dict[tuple[str, str], list[str]] = {}
-    for walk in walks:
-        found = _stage(walk)
+    for trajectory in trajectories:
+        found = _stage(trajectory)
         stages.setdefault((found["start"], found["goals"]), []).append(found["goal"])
     rows: Rows = []
     for (start, text), taken in sorted(stages.items()):
@@ -103,30 +93,29 @@ def score_stages(cell: dict[str, Any]) -> Rows:
     return rows
 
 
-def read_stages(cell: dict[str, Any]) -> Rows:
-    """How well a predictor reads the people of a kitchen, by cross-validation.
+@trial_function(TrialName("recorded/accuracy", ("benchmarks.recorded_people.run:read_stages",)))
+def evaluate_by_stage(trial: dict[str, Any]) -> Rows:
+    """How well a predictor predicts the goals of the people in a kitchen, by cross-validation.
 
     Returns:
-        Rows ``start, goals, goal, participant, walks, correct``: how often right, mean over fractions observed and
-        repeats.
+        Rows ``start, goals, goal, participant, walks, correct``: how many trajectories, and how often predictions are
+        right, mean over fractions observed and repeats.
     """
-    from predictors.evaluation.cross_validation import evaluate
-    from predictors.registry import make_predictor
-
-    walks = _walks(cell)
-    predictor = make_predictor(cell["how"]["name"], **cell["how"]["parameters"])
-    found = evaluate(
-        {"it": predictor},
-        walks,
-        cv=cell["folds"],
-        repeats=cell["repeats"],
-        cut=cell["cut"],
-        rare="keep",
-        seed=cell["seed"],
-    )
     import pandas as pd
 
-    stages = pd.DataFrame([_stage(walk) | {"trajectory": i} for i, walk in enumerate(walks)])
+    from predictors.evaluation.cross_validation import evaluate
+
+    trajectories = _recorded(trial)
+    found = evaluate(
+        {"it": predictor_from(trial["how"])},
+        trajectories,
+        cv=trial["folds"],
+        repeats=trial["repeats"],
+        cut=trial["cut"],
+        rare="keep",
+        seed=trial["seed"],
+    )
+    stages = pd.DataFrame([_stage(one) | {"trajectory": i} for i, one in enumerate(trajectories)])
     table = found.table.drop(columns="goal").merge(stages, on="trajectory")
     keys = ["start", "goals", "goal", "participant"]
     each = table.groupby(keys).agg(walks=("trajectory", "nunique"), correct=("correct", "mean")).reset_index()

@@ -1,4 +1,4 @@
-"""The settings of the experiment, as data, and the cells they make."""
+"""The settings of the experiment, as data, and the trials they make."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import Any, Final
 from benchmarks.experiments.prediction.sweep import LAYOUTS, PREDICTORS
 from legible_envs.rollouts.trajectory import Cut
 
-__all__ = ["BOOTSTRAPS", "FULL", "MIN_WALKS", "QUICK", "Settings", "reading_cells", "score_cells"]
+__all__ = ["BOOTSTRAPS", "FULL", "MIN_WALKS", "QUICK", "Settings", "accuracy_trials", "score_trials"]
 
 MIN_WALKS: Final = 10
-"""Stages and reaches with fewer recorded walks are left out: their accuracy is mostly chance."""
+"""Stages and goals with fewer recorded trajectories are left out: their accuracy is mostly chance."""
 BOOTSTRAPS: Final = 2000
 """Resamples behind an interval."""
 
@@ -46,22 +46,30 @@ FULL: Final = Settings()
 QUICK: Final = Settings(predictors=("shortest distance", "Eq. 1", "MaxEnt IRL", "logistic"), repeats=1)
 
 
-def score_cells(settings: Settings, walks: int) -> list[dict[str, Any]]:
-    """One cell per kitchen and candidate set, for the legibility of its stages.
+def score_trials(settings: Settings, recorded: int) -> list[dict[str, Any]]:
+    """One trial per kitchen and candidate set, for the legibility of its stages.
 
     Args:
         settings: The settings.
-        walks: How many are recorded, so that other recordings are other cells.
+        recorded: How many trajectories are recorded, so that other recordings make other trials.
     """
     return [
-        {"candidate_set": candidate_set, "kitchen": layout, "recorded_walks": walks}
+        {"candidate_set": candidate_set, "kitchen": layout, "recorded_walks": recorded}
         for candidate_set in settings.candidate_sets
         for layout in settings.layouts
     ]
 
 
-def reading_cells(settings: Settings, walks: int) -> list[dict[str, Any]]:
-    """One cell per kitchen, candidate set and predictor; arguments as for :func:`score_cells`."""
+def accuracy_trials(settings: Settings, recorded: int) -> list[dict[str, Any]]:
+    """One trial per kitchen, candidate set and predictor.
+
+    Args:
+        settings: The settings.
+        recorded: How many trajectories are recorded, so that other recordings make other trials.
+
+    Raises:
+        ValueError: A label that no predictor of the benchmark on recorded play has.
+    """
     known = {setting.label: setting for setting in PREDICTORS}
     unknown = [label for label in settings.predictors if label not in known]
     if unknown:
@@ -70,12 +78,12 @@ def reading_cells(settings: Settings, walks: int) -> list[dict[str, Any]]:
         place
         | {
             "predictor": label,
-            "how": {"name": known[label].predictor, "parameters": dict(known[label].parameters)},
+            "how": known[label].how,
             "cut": settings.cut,
             "folds": settings.folds,
             "repeats": settings.repeats,
             "seed": settings.seed,
         }
-        for place in score_cells(settings, walks)
+        for place in score_trials(settings, recorded)
         for label in settings.predictors
     ]

@@ -1,4 +1,4 @@
-"""Tables, figures and words from logged results alone."""
+"""Tables, figures and prose from logged results alone."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from benchmarks.experiments.conditions import stacked, variance_rows
 from benchmarks.experiments.tabletop import figures, narrative, tables
 from benchmarks.reports.experiment_report import Section, write_tables
+from benchmarks.reports.narrative import narrate
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,22 +38,21 @@ def sections(folder: str | Path) -> list[Section]:
     write_tables(folder / "tables", found.items())
     drawn = figures.draw_all(results, folder / "figures")
     return [
-        *_reading_sections(results, found, drawn),
+        *_accuracy_sections(results, found, drawn),
         *_claim_sections(results, found, hypotheses, drawn),
         Section(
             "With a robot",
             narrative.about_teams(results, found["teams"], found["team_differences"]),
             {
-                "Against the Baseline, the robot reads by Eq. 1 (Tukey's intervals, people as units)": found[
-                    "team_differences"
-                ],
-                "All measures, means over people and 95 % intervals": found["teams"],
+                f"Against the Baseline, the robot predicts by {_first_robot(results)} "
+                "(Tukey's intervals, participants as units)": found["team_differences"],
+                "All measures, means over participants and 95 % intervals": found["teams"],
             },
             drawn["teams"],
         ),
         Section(
-            "What is taken for what",
-            f"Confusions at the tables shown, {results.predictors[0]}, in reaches: means over fractions and repeats.",
+            "Confusions",
+            narrate("tabletop/confusion", predictor=results.predictors[0]),
             {},
             drawn["confusion"],
         ),
@@ -73,21 +73,21 @@ def _tables(results: tables.Results) -> dict[str, pd.DataFrame]:
         "anova": variance_rows(tables.accuracy_rows(results), results.predictors, best),
         "compliance": tables.compliance_table(results),
         "teams": tables.team_table(results),
-        "team_differences": tables.team_differences(results, str(results.teams["reader"].iloc[0])),
+        "team_differences": tables.team_differences(results, _first_robot(results)),
     }
 
 
-def _reading_sections(
+def _accuracy_sections(
     results: tables.Results, found: dict[str, pd.DataFrame], drawn: dict[str, list[Path]]
 ) -> list[Section]:
     return [
         Section(
             "Tables", narrative.about_layouts(results), {"Tables by condition": found["layouts"]}, drawn["layouts"]
         ),
-        Section("People", narrative.PEOPLE),
+        Section("Participants", narrative.about_participants()),
         Section(
-            "How well people are read",
-            f"{narrative.about_reading(results, found['metrics'], found['anova'])}\n\n{narrative.UNITS}",
+            "How well goals are predicted",
+            narrative.about_accuracy(results, found["metrics"], found["anova"]),
             {
                 "Figures of merit, mean over 10 to 90 % observed": found["metrics"],
                 "Over all fractions: one-way analyses of variance": _overall(found["anova"]),
@@ -97,7 +97,7 @@ def _reading_sections(
         ),
         Section(
             "Beside the paper",
-            narrative.agreement(found["published"], found["metrics"], results.predictors),
+            narrative.about_agreement(found["published"], found["metrics"], results.predictors),
             {"Weighted F1, precision and recall": found["published"]},
             drawn["published"],
         ),
@@ -127,11 +127,15 @@ def _claim_sections(
             drawn["curves"],
         ),
         Section(
-            "People who ignore virtual obstacles",
+            "Participants who ignore virtual obstacles",
             narrative.about_compliance(found["compliance"]),
-            {"Accuracy by how often people reach across obstacles": found["compliance"]},
+            {"Accuracy by how often participants reach across obstacles": found["compliance"]},
         ),
     ]
+
+
+def _first_robot(results: tables.Results) -> str:
+    return str(results.teams["reader"].iloc[0])
 
 
 def _layout_table(layouts: pd.DataFrame) -> pd.DataFrame:

@@ -1,29 +1,29 @@
-"""Searching tables, simulating people at them, reading these people, and letting them work with a robot."""
+"""Searching tables, simulating participants at them, predicting their goals, and letting them work with a robot."""
 
 from __future__ import annotations
 
-import dataclasses
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
+from benchmarks.experiments.predictor_settings import predictor_from
+from benchmarks.experiments.running import Rows, RunOptions, log_trials, with_layouts
 from benchmarks.experiments.tabletop.sweep import (
     DESIGNS,
     FULL,
     QUICK,
     Settings,
-    curve_cells,
-    layout_cells,
-    reading_cells,
-    spread_cells,
-    team_cells,
+    accuracy_trials,
+    curve_trials,
+    layout_trials,
+    spread_trials,
+    team_trials,
 )
-from benchmarks.experiments.trial_rows import curve_rows, judged_rows, make_judge
-from benchmarks.reports.experiment_report import write_table
-from benchmarks.trials import Event, run_cells
+from benchmarks.experiments.trial_rows import accuracy_rows, curve_rows
+from benchmarks.trials import TrialName, trial_function
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,12 +32,19 @@ if TYPE_CHECKING:
     from legible_envs.tabletop import TabletopLayout, TabletopTask
     from legible_envs.tabletop.humans.simulation import Person
 
-__all__ = ["find_table", "learn_people", "play_with_robot", "read_people", "reproduce", "simulate", "spread_of_reaches"]
-
-Rows = list[dict[str, Any]]
-Progress = Callable[[Event], object] | None
+__all__ = [
+    "evaluate_predictor",
+    "find_table",
+    "play_with_robot",
+    "reproduce",
+    "simulate",
+    "spread_of_reaches",
+    "trace_learning_curve",
+]
 
 TASK = "columns"
+
+_FORMER = "benchmarks.tabletop_conditions.run"
 
 
 def reproduce(
@@ -45,10 +52,8 @@ def reproduce(
     *,
     quick: bool = False,
     seeds: int | None = None,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    progress: Progress = None,
     settings: Settings | None = None,
+    **how: Unpack[RunOptions],
 ) -> None:
     """Run what is not there yet, and write result files; tables and figures are made of them by ``sections``.
 
@@ -57,41 +62,31 @@ def reproduce(
             ``teams.csv`` hold the results.
         quick: Fewer layouts, evaluations and repeats, no neural predictor.
         seeds: Layouts per condition, each searched anew; None for those of the settings.
-        workers: See :func:`benchmarks.trials.run_cells`.
-        scheduler: See there.
-        progress: See there; called for each of the five parts in turn.
         settings: In place of the full or quick ones.
+        how: ``workers``, ``scheduler`` and ``progress`` of :func:`benchmarks.trials.run_trials`, for each of the five
+            parts in turn.
 
     Raises:
-        CellsFailed: Some cells failed; everything else is finished and on disk.
+        TrialsFailed: Some trials failed; everything else is finished and on disk.
         ValueError: Fewer than two layouts per condition: nothing could be said about conditions.
     """
-    settings = settings or (QUICK if quick else FULL)
-    if seeds is not None:
-        settings = dataclasses.replace(settings, layouts=seeds)
-    if settings.layouts < 2:
-        raise ValueError(
-            f"conditions are compared by layouts: 2 or more per condition are needed, got {settings.layouts}"
-        )
-    folder = Path(folder)
+    settings, folder = with_layouts(settings or (QUICK if quick else FULL), seeds), Path(folder)
 
-    def run(function: Callable[[dict[str, Any]], Any], cells: Rows, name: str) -> pd.DataFrame:
-        found = run_cells(function, cells, folder, workers=workers, scheduler=scheduler, progress=progress)
-        hidden = [c for c in map(str, found) if c.startswith("how.") or (c == "json" and name != "layouts")]
-        write_table(folder / f"{name}.csv", found.drop(columns=hidden))
-        return found
+    def log(name: str, function: Any, trials: Rows, *hidden: str) -> pd.DataFrame:
+        return log_trials(function, trials, folder / f"{name}.csv", hidden=("how", *hidden), **how)
 
-    places: Rows = run(find_table, layout_cells(settings), "layouts").to_dict("records")  # type: ignore[assignment]
-    run(read_people, reading_cells(settings, places), "readings")
-    run(learn_people, curve_cells(settings, places), "curves")
-    run(spread_of_reaches, spread_cells(settings, places), "spreads")
-    run(play_with_robot, team_cells(settings, places), "teams")
+    places: Rows = log("layouts", find_table, layout_trials(settings)).to_dict("records")  # type: ignore[assignment]
+    log("readings", evaluate_predictor, accuracy_trials(settings, places), "json")
+    log("curves", trace_learning_curve, curve_trials(settings, places), "json")
+    log("spreads", spread_of_reaches, spread_trials(settings, places), "json")
+    log("teams", play_with_robot, team_trials(settings, places), "json")
 
 
-# -- cells ------------------------------------------------------------------------------------------------------------
+# -- trials ------------------------------------------------------------------------------------------------------------
 
 
-def find_table(cell: dict[str, Any]) -> dict[str, Any]:
+@trial_function(TrialName("tabletop/layout", (f"{_FORMER}:find_table",)))
+def find_table(trial: dict[str, Any]) -> dict[str, Any]:
     """One table of a condition, and what it scores.
 
     The random one is the median by legibility of as many random tables as a search begins with.
@@ -99,21 +94,21 @@ def find_table(cell: dict[str, Any]) -> dict[str, Any]:
     from legible_envs.tabletop import TabletopWorkspace
     from optimizers import search
 
-    workspace = TabletopWorkspace(TASK, DESIGNS.get(cell["condition"], "both"))  # type: ignore[arg-type]
+    workspace = TabletopWorkspace(TASK, DESIGNS.get(trial["condition"], "both"))  # type: ignore[arg-type]
     evaluations = 0
-    if cell["condition"] == "Baseline":
+    if trial["condition"] == "Baseline":
         layout = workspace.baseline
-    elif cell["condition"] == "Random":
-        genomes = workspace.sample(cell["initial"], np.random.default_rng(cell["layout"]))
+    elif trial["condition"] == "Random":
+        genomes = workspace.sample(trial["initial"], np.random.default_rng(trial["layout"]))
         order = np.argsort(workspace.legibility(genomes), kind="stable")
         layout, evaluations = workspace.decode(genomes[order[len(order) // 2]]), len(genomes)
     else:
         found = search(
             workspace,
             objective="legibility",
-            evaluations=cell["evaluations"],
-            initial=cell["initial"],
-            seed=cell["layout"],
+            evaluations=trial["evaluations"],
+            initial=trial["initial"],
+            seed=trial["layout"],
             progress=False,
         )
         if found.best_genome is None:
@@ -131,52 +126,58 @@ def _task() -> TabletopTask:
     return read_task(TASK)
 
 
-def _layout(cell: dict[str, Any]) -> TabletopLayout:
+def _layout(trial: dict[str, Any]) -> TabletopLayout:
     from legible_envs.tabletop import TabletopLayout
 
-    return TabletopLayout.from_json(cell["json"])
+    return TabletopLayout.from_json(trial["json"])
 
 
-def _people(cell: dict[str, Any]) -> Iterator[tuple[str, Person, np.random.Generator]]:
-    """Name, habits and source of randomness of each person; the same ones whether or not they comply."""
+def _people(trial: dict[str, Any]) -> Iterator[tuple[str, Person, np.random.Generator]]:
+    """Name, habits and source of randomness of each participant; the same ones whether or not they comply."""
     from legible_envs.tabletop.humans.simulation import Person, ReachModel, sample_person
 
-    population = ReachModel(Person(crossing_rate=cell["crossing"]))
-    for number, source in enumerate(np.random.SeedSequence(cell["seed"]).spawn(cell["participants"])):
+    population = ReachModel(Person(crossing_rate=trial["crossing"]))
+    for number, source in enumerate(np.random.SeedSequence(trial["seed"]).spawn(trial["participants"])):
         rng = np.random.default_rng(source)
-        yield f"{cell['condition']}/{cell['layout']}/{number}", sample_person(rng, population), rng
+        yield f"{trial['condition']}/{trial['layout']}/{number}", sample_person(rng, population), rng
 
 
-def simulate(cell: dict[str, Any]) -> list[Trajectory]:
-    """The reaches of a cell's people that have something to predict: two goals or more to choose from."""
+def simulate(trial: dict[str, Any]) -> list[Trajectory]:
+    """The reaches of a trial's participants that have something to predict: two goals or more to choose from."""
     from legible_envs.tabletop.humans.simulation import simulate_task
 
-    task, layout = _task(), _layout(cell)
-    labels = {"condition": cell["condition"], "layout_name": f"{cell['condition']}/{cell['layout']}"}
+    task, layout = _task(), _layout(trial)
+    labels = {"condition": trial["condition"], "layout_name": f"{trial['condition']}/{trial['layout']}"}
     found = []
-    for name, person, rng in _people(cell):
+    for name, person, rng in _people(trial):
         found += simulate_task(layout, person, rng, task=task, participant=name, **labels)
     return [reach for reach in found if len(reach.candidates) > 1]
 
 
-def read_people(cell: dict[str, Any]) -> Rows:
-    """How well a predictor reads a cell's people; see :func:`benchmarks.experiments.trial_rows.judged_rows`."""
-    predictor = make_judge(cell["how"])
-    return judged_rows(predictor, simulate(cell), folds=cell["folds"], repeats=cell["repeats"], seed=cell["seed"])
+@trial_function(TrialName("tabletop/accuracy", (f"{_FORMER}:read_people",)))
+def evaluate_predictor(trial: dict[str, Any]) -> Rows:
+    """How well a predictor predicts the goals of a trial's participants; the rows of :func:`.accuracy_rows`."""
+    validation = {"folds": trial["folds"], "repeats": trial["repeats"], "seed": trial["seed"]}
+    return accuracy_rows(predictor_from(trial["how"]), simulate(trial), **validation)
 
 
-def learn_people(cell: dict[str, Any]) -> Rows:
-    """A predictor's learning curve on a cell's people; see :func:`benchmarks.experiments.trial_rows.curve_rows`."""
-    predictor = make_judge(cell["how"])
-    return curve_rows(predictor, simulate(cell), shares=cell["shares"], repeats=cell["repeats"], seed=cell["seed"])
+@trial_function(TrialName("tabletop/curve", (f"{_FORMER}:learn_people",)))
+def trace_learning_curve(trial: dict[str, Any]) -> Rows:
+    """A predictor's learning curve on a trial's participants; the rows of :func:`.curve_rows`.
+
+    Splits whose smallest training set never mentions some goal, which could then not even be named, are drawn anew.
+    """
+    splits = {"shares": trial["shares"], "repeats": trial["repeats"], "seed": trial["seed"]}
+    return curve_rows(predictor_from(trial["how"]), simulate(trial), **splits, rare="redraw")
 
 
-def spread_of_reaches(cell: dict[str, Any]) -> Rows:
+@trial_function(TrialName("tabletop/spread", (f"{_FORMER}:spread_of_reaches",)))
+def spread_of_reaches(trial: dict[str, Any]) -> Rows:
     """Mean and covariance of the reaches to each goal, step by step.
 
-    Every person reaches for every cube once from where they place them, so that the number of reaches behind each
-    covariance is the number of people, in every condition; and covariances of the same number of steps are taken with
-    and without warping inside the same band. The floor that predictors add is taken off.
+    Every participant reaches for every cube once from where they place them, so that the number of reaches behind each
+    covariance is the number of participants, in every condition; and covariances of the same number of steps are taken
+    with and without warping inside the same band. The floor that predictors add is taken off.
 
     Returns:
         A row per alignment, goal and step: ``time`` (share of the reach), ``x, y`` (mean from the start, metres) and
@@ -184,12 +185,12 @@ def spread_of_reaches(cell: dict[str, Any]) -> Rows:
     """
     from predictors.reaching.gaussian import TimeSeriesGaussian
 
-    reaches = _balanced_reaches(cell)
+    reaches = _balanced_reaches(trial)
     rows: Rows = []
     for alignment in ("none", "mean"):
-        fitted = TimeSeriesGaussian(cell["samples"], alignment=alignment).fit(reaches)  # type: ignore[arg-type]
+        fitted = TimeSeriesGaussian(trial["samples"], alignment=alignment).fit(reaches)  # type: ignore[arg-type]
         covariances = fitted.covariances_ - np.eye(2) * fitted.floor**2
-        times = np.linspace(0.0, 1.0, cell["samples"])
+        times = np.linspace(0.0, 1.0, trial["samples"])
         for goal, count, means, sizes in zip(fitted.goals_, fitted.counts_, fitted.means_, covariances, strict=True):
             for step, (time, mean, size) in enumerate(zip(times, means, sizes, strict=True)):
                 row = {"alignment": alignment, "goal": str(goal), "reaches": int(count), "step": step, "time": time}
@@ -198,23 +199,24 @@ def spread_of_reaches(cell: dict[str, Any]) -> Rows:
     return rows
 
 
-def _balanced_reaches(cell: dict[str, Any]) -> list[Trajectory]:
+def _balanced_reaches(trial: dict[str, Any]) -> list[Trajectory]:
     from legible_envs.rollouts.trajectory import Trajectory
     from legible_envs.tabletop.humans.simulation import simulate_reach
 
-    layout = _layout(cell)
+    layout = _layout(trial)
     found = []
-    for _, person, rng in _people(cell):
+    for _, person, rng in _people(trial):
         for goal in layout.goals:
             times, states = simulate_reach(layout, "assembly", goal, person, rng)
             found.append(Trajectory(states, times, start="assembly", goal=goal, candidates=layout.goals))
     return found
 
 
-def play_with_robot(cell: dict[str, Any]) -> Rows:
-    """Each person at work: a row per person and round, with the measures of :mod:`.fluency`.
+@trial_function(TrialName("tabletop/team", (f"{_FORMER}:play_with_robot",)))
+def play_with_robot(trial: dict[str, Any]) -> Rows:
+    """Each participant at work: a row per participant and round, with the measures of :mod:`.fluency`.
 
-    Without a robot only the time until all is done is known, and that the person never waits for anybody.
+    Without a robot the only measure is the time until the task is done.
     """
     import gymnasium as gym
 
@@ -222,12 +224,12 @@ def play_with_robot(cell: dict[str, Any]) -> Rows:
     from legible_envs.tabletop.policies import ReachingPlayer
 
     robot: dict[str, Any] = {}
-    if cell["robot"]:
-        robot = {"partner": "robot", "predictor": cell["robot"], "threshold": cell["threshold"]}
-    env = gym.make("LegibleTabletop-v0", task=TASK, layout=_layout(cell), **robot)
+    if trial["robot"]:
+        robot = {"partner": "robot", "predictor": trial["robot"], "threshold": trial["threshold"]}
+    env = gym.make("LegibleTabletop-v0", task=TASK, layout=_layout(trial), **robot)
     rows: Rows = []
-    for name, person, rng in _people(cell):
-        for turn in range(cell["rounds"]):
+    for name, person, rng in _people(trial):
+        for turn in range(trial["rounds"]):
             player, over = ReachingPlayer(env, person, rng), False
             obs, info = env.reset(seed=turn)
             while not over:

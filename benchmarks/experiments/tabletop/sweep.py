@@ -1,4 +1,4 @@
-"""The settings of the experiment, as data, and the cells they make."""
+"""The settings of the experiment, as data, and the trials they make."""
 
 from __future__ import annotations
 
@@ -8,24 +8,26 @@ from typing import Any, Final
 
 import numpy as np
 
-from benchmarks.experiments.trial_rows import Judge
+from benchmarks.experiments.predictor_settings import PredictorSetting
 
 __all__ = [
+    "ALONE",
     "CONDITIONS",
     "DESIGNS",
     "FULL",
     "HAVE_OBSTACLES",
+    "NO_PREDICTION",
     "PUBLISHED",
     "PUBLISHED_SPREAD",
     "QUICK",
-    "READERS",
-    "Reader",
+    "ROBOTS",
+    "RobotSetting",
     "Settings",
-    "curve_cells",
-    "layout_cells",
-    "reading_cells",
-    "spread_cells",
-    "team_cells",
+    "accuracy_trials",
+    "curve_trials",
+    "layout_trials",
+    "spread_trials",
+    "team_trials",
 ]
 
 CONDITIONS: Final = ("Random", "Baseline", "Placement", "Virtual Obstacle", "Both")
@@ -50,21 +52,28 @@ PUBLISHED_SPREAD: Final[Mapping[str, Mapping[str, float]]] = {
 """Tung et al. (HRI 2024): covariances of reaches to one goal, m^4 and m^2."""
 
 PREDICTORS: Final = (
-    Judge("Gaussian (paper's index)", "reach-gaussian", {"online": "fraction", "alignment": "mean"}),
-    Judge("nearest cube", "shortest-distance", {"metric": "euclidean"}, learns=False),
-    Judge("Gaussian", "reach-gaussian"),
-    Judge("Eq. 1", "reach-bayesian", learns=False),
-    Judge("logistic", "reach-logistic"),
-    Judge("k-NN", "reach-knn"),
+    PredictorSetting("Gaussian (paper's index)", "reach-gaussian", {"online": "fraction", "alignment": "mean"}),
+    PredictorSetting("nearest cube", "shortest-distance", {"metric": "euclidean"}, learns=False),
+    PredictorSetting("Gaussian", "reach-gaussian"),
+    PredictorSetting("Eq. 1", "reach-bayesian", learns=False),
+    PredictorSetting("logistic", "reach-logistic"),
+    PredictorSetting("k-NN", "reach-knn"),
 )
-"""The paper's two first. Its Gaussian is indexed by the share of the whole duration, which nobody knows while a reach
-is going on; the one called just so aligns what was seen so far."""
-NEURAL: Final = Judge("GRU", "recurrent", {"members": 2, "max_epochs": 40, "patience": 6, "device": "cpu"}, repeats=1)
+"""The paper's two first. Its Gaussian is indexed by the share of the whole duration, which is unknown while a reach is
+going on; the one called just so aligns what was seen so far."""
+NEURAL: Final = PredictorSetting(
+    "GRU", "recurrent", {"members": 2, "max_epochs": 40, "patience": 6, "device": "cpu"}, max_repeats=1
+)
+
+ALONE: Final = "alone"
+"""What tables call work without a robot."""
+NO_PREDICTION: Final = "no prediction"
+"""What tables call a robot that holds all goals for equally likely."""
 
 
 @dataclass(frozen=True)
-class Reader:
-    """How a robot reads the person it works with.
+class RobotSetting:
+    """How a robot predicts the goals of the participant it works with.
 
     Attributes:
         label: What tables call it.
@@ -75,14 +84,14 @@ class Reader:
     predictor: str
 
 
-READERS: Final = (
-    Reader("Eq. 1", "bayesian"),
-    Reader("Gaussian", "predictors.reaching.gaussian:TimeSeriesGaussian"),
-    Reader("reads nothing", "predictors.uniform:UniformPredictor"),
-    Reader("alone", ""),
+ROBOTS: Final = (
+    RobotSetting("Eq. 1", "bayesian"),
+    RobotSetting("Gaussian", "predictors.reaching.gaussian:TimeSeriesGaussian"),
+    RobotSetting(NO_PREDICTION, "predictors.uniform:UniformPredictor"),
+    RobotSetting(ALONE, ""),
 )
-"""The Gaussian has learned from simulated people at the very table. Who reads nothing acts when the person holds
-something, or has no choice."""
+"""The Gaussian has learned from simulated participants at the same table. A robot without prediction acts when the
+participant holds an object, or has one goal only."""
 
 
 @dataclass(frozen=True)
@@ -90,35 +99,36 @@ class Settings:
     """How much is done.
 
     Attributes:
-        layouts: Layouts per condition, each searched with a seed of its own; of the one Baseline, groups of people.
-        participants: Simulated people per layout; each reaches for the eight cubes once.
+        layouts: Layouts per condition, each searched with a seed of its own; of the one Baseline, groups of
+            participants.
+        participants: Simulated participants per layout; each reaches for the eight cubes once.
         initial: Random tables: what a search begins with, and what the median is taken of.
         evaluations: Of a search, the initial ones included.
-        predictors: Whom to compare.
+        predictors: Which predictors to compare.
         folds: Of the cross-validation.
         repeats: Of the cross-validation.
         shares: Of the reaches not held out, learned from in learning curves.
         curve_repeats: Splits of the learning curves.
-        crossing: Probabilities with which people who do not always comply reach across obstacles.
+        crossing: Probabilities with which participants who do not always comply reach across obstacles.
         samples: Steps of a mean reach, for covariances.
-        readers: Of the robots.
-        rounds: How often each person builds the task with each robot.
+        robots: Which robots participants work with.
+        rounds: How often each participant builds the task with each robot.
         threshold: A robot is sure above this probability.
-        seed: Of the people and splits.
+        seed: Of the participants and splits.
     """
 
     layouts: int = 5
     participants: int = 12
     initial: int = 1000
     evaluations: int = 200_000
-    predictors: tuple[Judge, ...] = (*PREDICTORS, NEURAL)
+    predictors: tuple[PredictorSetting, ...] = (*PREDICTORS, NEURAL)
     folds: int = 4
     repeats: int = 3
     shares: tuple[float, ...] = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
     curve_repeats: int = 10
     crossing: tuple[float, ...] = (0.1, 0.5, 1.0)
     samples: int = 50
-    readers: tuple[Reader, ...] = READERS
+    robots: tuple[RobotSetting, ...] = ROBOTS
     rounds: int = 3
     threshold: float = 0.8
     seed: int = 0
@@ -139,73 +149,73 @@ QUICK: Final = Settings(
 Place = Mapping[str, Any]
 
 
-def layout_cells(settings: Settings) -> list[dict[str, Any]]:
+def layout_trials(settings: Settings) -> list[dict[str, Any]]:
     """One search, or one draw of random tables, for each layout."""
-    cells = []
+    trials = []
     for condition in CONDITIONS:
         for number in range(settings.layouts):
-            cell: dict[str, Any] = {"condition": condition, "layout": number}
+            trial: dict[str, Any] = {"condition": condition, "layout": number}
             if condition != "Baseline":
-                cell["initial"] = settings.initial
+                trial["initial"] = settings.initial
             if condition in DESIGNS:
-                cell["evaluations"] = settings.evaluations
-            cells.append(cell)
-    return cells
+                trial["evaluations"] = settings.evaluations
+            trials.append(trial)
+    return trials
 
 
-def reading_cells(settings: Settings, places: Sequence[Place]) -> list[dict[str, Any]]:
-    """Every predictor on people at every table; where there are obstacles, also on people who ignore them.
+def accuracy_trials(settings: Settings, places: Sequence[Place]) -> list[dict[str, Any]]:
+    """Every predictor on participants at every table; with obstacles, also on participants who ignore them.
 
     Args:
         settings: The settings.
         places: ``condition``, ``layout`` (its number) and ``json``.
     """
-    cells = []
+    trials = []
     for place in places:
         rates = settings.crossing if place["condition"] in HAVE_OBSTACLES else ()
         for rate in (0.0, *rates):
-            for judge in settings.predictors:
-                if rate and judge.repeats:
+            for setting in settings.predictors:
+                if rate and setting.max_repeats is not None:
                     continue  # the table of compliance does without those that take long
-                extra = {"folds": settings.folds, "repeats": judge.repeats or settings.repeats}
-                cells.append(_with_people(settings, place, rate) | _judged(judge) | extra)
-    return cells
+                extra = {"folds": settings.folds, "repeats": setting.repeats(settings.repeats)}
+                trials.append(_with_people(settings, place, rate) | _predicted_by(setting) | extra)
+    return trials
 
 
-def curve_cells(settings: Settings, places: Sequence[Place]) -> list[dict[str, Any]]:
+def curve_trials(settings: Settings, places: Sequence[Place]) -> list[dict[str, Any]]:
     """A learning curve of every predictor that learns."""
     return [
         _with_people(settings, place)
-        | _judged(judge)
-        | {"shares": list(settings.shares), "repeats": min(judge.repeats or 99, settings.curve_repeats)}
+        | _predicted_by(setting)
+        | {"shares": list(settings.shares), "repeats": setting.repeats(settings.curve_repeats)}
         for place in places
-        for judge in settings.predictors
-        if judge.learns
+        for setting in settings.predictors
+        if setting.learns
     ]
 
 
-def spread_cells(settings: Settings, places: Sequence[Place]) -> list[dict[str, Any]]:
-    """How much reaches to one goal differ, at every table."""
+def spread_trials(settings: Settings, places: Sequence[Place]) -> list[dict[str, Any]]:
+    """How much reaches to the same goal differ, at every table."""
     return [_with_people(settings, place) | {"samples": settings.samples} for place in places]
 
 
-def team_cells(settings: Settings, places: Sequence[Place]) -> list[dict[str, Any]]:
-    """The same people at work, with every robot and alone."""
+def team_trials(settings: Settings, places: Sequence[Place]) -> list[dict[str, Any]]:
+    """The same participants at work, with every robot and alone."""
     return [
         _with_people(settings, place)
-        | {"reader": reader.label, "robot": reader.predictor, "rounds": settings.rounds}
+        | {"reader": robot.label, "robot": robot.predictor, "rounds": settings.rounds}
         | {"threshold": settings.threshold}
         for place in places
-        for reader in settings.readers
+        for robot in settings.robots
     ]
 
 
-def _judged(judge: Judge) -> dict[str, Any]:
-    return {"predictor": judge.label, "how": judge.how}
+def _predicted_by(setting: PredictorSetting) -> dict[str, Any]:
+    return {"predictor": setting.label, "how": setting.how}
 
 
 def _with_people(settings: Settings, place: Place, crossing: float = 0.0) -> dict[str, Any]:
-    """A cell's table and people: the same people whoever reads them, and whether or not they comply."""
+    """A trial's table and participants: the same ones for every predictor, and whether or not they comply."""
     condition, number = str(place["condition"]), int(place["layout"])
     source = np.random.SeedSequence((settings.seed, CONDITIONS.index(condition), number))
     return {

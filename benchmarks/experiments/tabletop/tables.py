@@ -11,7 +11,7 @@ import numpy as np
 from benchmarks.experiments import conditions
 from benchmarks.experiments.conditions import figures_of_merit, in_order
 from benchmarks.experiments.hypotheses import Hypotheses, assess_hypotheses
-from benchmarks.experiments.tabletop.sweep import CONDITIONS, HAVE_OBSTACLES, PUBLISHED, PUBLISHED_SPREAD
+from benchmarks.experiments.tabletop.sweep import CONDITIONS, HAVE_OBSTACLES, NO_PREDICTION, PUBLISHED, PUBLISHED_SPREAD
 from benchmarks.experiments.trial_rows import by_table, confusion_matrix, logged_rows
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ MEASURES: Final = (
 )
 """What is told of teams, as :meth:`~legible_envs.tabletop.partner.fluency.TeamMetrics.summary` names it."""
 TESTS: Final = {"Placement": ["Baseline"], "Virtual Obstacle": ["Baseline"], "Both": list(CONDITIONS[1:-1])}
-"""Whose people should be read better, than whose."""
+"""Designs, and the conditions than which their goals should be predicted better."""
 SHARE: Final = 0.3
 """Of the data, in the test whether less of it is enough."""
 
@@ -63,7 +63,7 @@ class Results:
         readings: ``accuracy``, ``start``, ``metrics`` and ``confusion`` rows.
         curves: Learning curves.
         spreads: Means and covariances of reaches.
-        teams: Measures of people at work.
+        teams: Measures of participants at work.
     """
 
     layouts: pd.DataFrame
@@ -78,7 +78,7 @@ class Results:
         return list(dict.fromkeys(self.readings["accuracy"]["predictor"]))
 
     def complying(self, table: str) -> pd.DataFrame:
-        """Readings of people who go round obstacles."""
+        """Rows of participants who go round obstacles."""
         rows = self.readings[table]
         return rows[rows["crossing"] == 0].reset_index(drop=True)
 
@@ -91,6 +91,8 @@ def load_results(folder: Path) -> Results:
     """
     names = ("layouts", "readings", "curves", "spreads", "teams")
     layouts, readings, curves, spreads, teams = (logged_rows(folder, name, "tabletop") for name in names)
+    # What a robot without prediction was called in results of before.
+    teams = teams.replace({"reader": {"reads nothing": NO_PREDICTION}})
     return Results(layouts, by_table(readings), curves, spreads, teams)
 
 
@@ -109,7 +111,7 @@ def best_layouts(results: Results) -> pd.DataFrame:
     return pd.DataFrame(chosen).reset_index(drop=True)
 
 
-# -- how well people are read -----------------------------------------------------------------------------------------
+# -- how well goals are predicted -------------------------------------------------------------------------------------
 
 
 def accuracy_rows(results: Results) -> pd.DataFrame:
@@ -138,7 +140,7 @@ def beside_published(metrics: pd.DataFrame, predictors: list[str]) -> pd.DataFra
 
 
 def compliance_table(results: Results) -> pd.DataFrame:
-    """Accuracy, mean over fractions and layouts, by how often people reach across obstacles as if there were none.
+    """Accuracy, mean over fractions and layouts, by how often participants reach across obstacles.
 
     A row per predictor and rate; beside the conditions with obstacles, Placement, which has none to ignore.
     """
@@ -188,8 +190,8 @@ def sizes_of_covariances(spreads: pd.DataFrame) -> pd.DataFrame:
 def spread_table(results: Results) -> pd.DataFrame:
     """Determinant and trace of covariances by alignment and condition: means over steps, goals and layouts.
 
-    ``apart`` is how far mean reaches to two goals are from each other on the way (metres, mean over pairs and steps):
-    what spread has to be compared with.
+    ``apart`` is how far mean reaches to two goals are from each other (metres, mean over pairs and steps): what spread
+    has to be compared with.
     """
     import pandas as pd
 
@@ -215,18 +217,18 @@ def spread_beside_published(spread: pd.DataFrame) -> pd.DataFrame:
     return conditions.beside_published(PUBLISHED_SPREAD, ours)
 
 
-# -- people at work ---------------------------------------------------------------------------------------------------
+# -- teams ------------------------------------------------------------------------------------------------------------
 
 
 def team_people(results: Results) -> pd.DataFrame:
-    """A row per reader and person: means over rounds."""
+    """A row per robot and participant: means over rounds."""
     names = [name for name in MEASURES if name in results.teams]
     keys = ["reader", "condition", "layout", "participant"]
     return results.teams.groupby(keys, sort=False)[[*names, "path_length"]].mean().reset_index()
 
 
 def team_table(results: Results) -> pd.DataFrame:
-    """Mean and 95 % confidence interval of each measure, people as units: a row per reader, measure and condition."""
+    """Mean and 95 % interval of each measure, participants as units: a row per robot, measure and condition."""
     import pandas as pd
     from scipy import stats
 
@@ -244,14 +246,14 @@ def team_table(results: Results) -> pd.DataFrame:
     return in_order(pd.DataFrame(rows), reader=readers, measure=MEASURES, condition=CONDITIONS)
 
 
-def team_differences(results: Results, reader: str) -> pd.DataFrame:
-    """Each measure in each condition against the Baseline: Tukey's interval and p, people as units."""
+def team_differences(results: Results, robot: str) -> pd.DataFrame:
+    """Each measure in each condition against the Baseline: Tukey's interval and p, participants as units."""
     import pandas as pd
 
-    from predictors.evaluation.statistics import compare_conditions
+    from predictors.evaluation.comparison import compare_conditions
 
     people, parts = team_people(results), []
-    own = people[people["reader"] == reader]
+    own = people[people["reader"] == robot]
     for measure in MEASURES:
         known = own.dropna(subset=[measure])
         # The order decides the sign of differences: others less the Baseline.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from typing import Any
 
@@ -11,7 +12,7 @@ import pytest
 from scipy import stats
 
 from predictors.evaluation import compare_conditions
-from predictors.evaluation.statistics import holm, tukey_half_width
+from predictors.evaluation.statistics import hedges_g, holm, tukey_half_width
 
 
 def between(rng: np.random.Generator, sizes: tuple[int, ...], shift: float = 0.1, rows: int = 4) -> pd.DataFrame:
@@ -143,11 +144,21 @@ def test_effect_sizes_follow_their_definition() -> None:
     assert row["hedges_g"] == pytest.approx(row["cohens_d"] * (1 - 3 / (4 * 14 - 1)))
 
 
+def test_hedges_g_has_one_answer_where_nothing_varies_and_where_a_spread_is_unknown() -> None:
+    a, b = np.array([1.0, 2, 3, 4]), np.array([0.0, 1, 2, 3])
+    assert hedges_g(a, b) == pytest.approx(1 / np.std(a, ddof=1) * (1 - 3 / 23))
+    assert hedges_g(a, b) == -hedges_g(b, a)
+    assert math.isnan(hedges_g(a[:1], b))
+    assert hedges_g(np.ones(3), np.zeros(3)) == math.inf
+    assert hedges_g(np.zeros(3), np.ones(3)) == -math.inf
+    assert hedges_g(np.ones(3), np.ones(3)) == 0
+
+
 # -- the null hypothesis ----------------------------------------------------------------------------------------------
 
 
 def null_experiment(rng: np.random.Generator, people: int = 10, walks: int = 12) -> pd.DataFrame:
-    """Two conditions that do not differ, judged by 4 folds x 3 repeats; people differ from one another."""
+    """Two conditions that do not differ, evaluated by 4 folds x 3 repeats; people differ from one another."""
     parts = []
     for condition in ("a", "b"):
         talent = np.repeat(rng.beta(4, 4, people), walks)
