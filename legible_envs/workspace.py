@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
+from legible_envs.random_keys import BoundedKeys, KeyDecoder
 from legible_envs.support.plugins import Registry
 
 if TYPE_CHECKING:
@@ -95,6 +96,13 @@ class Workspace(ABC):
     @abstractmethod
     def valid(self, genomes: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
         """``(n,)`` which genomes are valid layouts."""
+
+    def key_decoder(self) -> KeyDecoder:
+        """How vectors of real numbers in [0, 1] stand for layouts (random keys); by default each key is one gene.
+
+        A workspace where :class:`~legible_envs.random_keys.BoundedKeys` must repair many layouts overrides this.
+        """
+        return BoundedKeys(self)
 
     # -- what they score -------------------------------------------------------------------------------------------
 

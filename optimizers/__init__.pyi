@@ -1,5 +1,6 @@
 from .archives import WorkspaceArchive, make_archive
 from .emitters.annealing import AnnealingEmitter
+from .emitters.base import WorkspaceEmitter
 from .emitters.checks import check_emitter
 from .emitters.covariance import CmaMaeEmitter, CmaMeEmitter
 from .emitters.differential_evolution import DifferentialEvolutionEmitter
@@ -31,6 +32,7 @@ __all__ = [
     "SearchInterrupted",
     "SearchResult",
     "WorkspaceArchive",
+    "WorkspaceEmitter",
     "check_emitter",
     "list_emitters",
     "load_run",

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
-from ribs.emitters import EmitterBase
 
+from legible_envs.workspace import Workspace
+from optimizers.emitters.base import AddInfo, Seed, WorkspaceEmitter
 from optimizers.errors import EmitterError
 
 if TYPE_CHECKING:
@@ -72,7 +73,7 @@ class FloatArchiveView:
         return {name: np.asarray(v, dtype=np.float64) if name == "solution" else v for name, v in data.items()}
 
 
-class GenomeAdapter(EmitterBase):
+class GenomeAdapter(WorkspaceEmitter):
     """Turns what an emitter proposes into valid genomes, and results back into what the emitter expects.
 
     ``ask`` rounds to whole numbers (only where genomes are integer), clips to the workspace's bounds, and leaves out
@@ -90,30 +91,20 @@ class GenomeAdapter(EmitterBase):
         initial: Random layouts proposed while the archive is empty.
     """
 
-    emits_valid = True
-
     def __init__(
         self,
         archive: ArchiveBase,
-        workspace: Any,
+        workspace: Workspace,
         emitter: Any,
         *,
         name: str = "emitter",
-        seed: int | np.random.SeedSequence | None = None,
+        seed: Seed = None,
         initial: int = 1000,
     ) -> None:
-        super().__init__(
-            archive,
-            solution_dim=archive.solution_dim,
-            bounds=None,
-            lower_bounds=workspace.lower_bounds,
-            upper_bounds=workspace.upper_bounds,
-        )
+        super().__init__(archive, workspace, seed=seed)
         self.emitter = emitter
-        self._workspace = workspace
         self._name = name
         self._initial = initial
-        self._rng = np.random.default_rng(seed)
         self._worst = np.inf
         self._raw: npt.NDArray[Any] | None = None
         self._kept = np.zeros(0, dtype=bool)
@@ -161,7 +152,7 @@ class GenomeAdapter(EmitterBase):
         solution: npt.ArrayLike,
         objective: npt.ArrayLike,
         measures: npt.ArrayLike,
-        add_info: dict[str, npt.NDArray[Any]],
+        add_info: AddInfo,
         **fields: npt.ArrayLike,
     ) -> None:
         """Hand the results back to the emitter, in its own order and numbers."""
@@ -179,14 +170,14 @@ class GenomeAdapter(EmitterBase):
         whole_scores[rows] = scores[scored]
         whole_measures = np.tile(np.asarray(self.archive.lower_bounds, dtype=np.float64), (n, 1))
         whole_measures[rows] = np.asarray(measures, dtype=np.float64)[scored]
-        info: dict[str, npt.NDArray[Any]] = {"status": np.zeros(n, dtype=np.int32), "value": np.full(n, worst - best)}
+        info: AddInfo = {"status": np.zeros(n, dtype=np.int32), "value": np.full(n, worst - best)}
         for name in ("status", "value"):
             if name in add_info:
                 info[name][rows] = np.asarray(add_info[name])[scored]
         self.emitter.tell(self._raw, whole_scores, whole_measures, info)
 
 
-class FunctionEmitter(EmitterBase):
+class FunctionEmitter(WorkspaceEmitter):
     """A plain function as an emitter.
 
     Args:
@@ -197,26 +188,20 @@ class FunctionEmitter(EmitterBase):
         seed: Seed of ``rng``.
     """
 
+    emits_valid = False
+
     def __init__(
         self,
         archive: ArchiveBase,
-        workspace: Any,
+        workspace: Workspace,
         *,
         propose: Callable[..., npt.NDArray[Any]],
         options: Mapping[str, Any] | None = None,
-        seed: int | np.random.SeedSequence | None = None,
+        seed: Seed = None,
     ) -> None:
-        super().__init__(
-            archive,
-            solution_dim=archive.solution_dim,
-            bounds=None,
-            lower_bounds=workspace.lower_bounds,
-            upper_bounds=workspace.upper_bounds,
-        )
-        self._workspace = workspace
+        super().__init__(archive, workspace, seed=seed)
         self._propose = propose
         self._options = dict(options or {})
-        self._rng = np.random.default_rng(seed)
 
     def ask(self) -> npt.NDArray[Any]:
         """Call the function."""

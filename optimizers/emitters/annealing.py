@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from ribs.emitters import EmitterBase
 
-from optimizers.emitters.mutation import draw_elites, perturbed
+from legible_envs.workspace import Workspace
+from optimizers.emitters.base import AddInfo, Seed, WorkspaceEmitter, check_at_least, read_only
+from optimizers.emitters.draws import draw_elites, perturbed
 
 if TYPE_CHECKING:
     from ribs.archives import ArchiveBase
 
-__all__ = ["AnnealingEmitter"]
+__all__ = ["AnnealingEmitter", "Chains"]
 
 _CALIBRATION = 1000
 _PER_GENE_PAIR = 16
@@ -23,7 +24,21 @@ _GROUPS = 8
 Array = npt.NDArray[np.float64]
 
 
-class AnnealingEmitter(EmitterBase):
+class Chains(NamedTuple):
+    """Where annealed chains stand, group by group.
+
+    Attributes:
+        genomes: ``(groups, chains, d)`` the layout each has reached.
+        scores: ``(groups, chains)`` its score.
+        temperature: The temperature at which each accepts or rejects its next step, in the unit of the objective.
+    """
+
+    genomes: npt.NDArray[Any]
+    scores: Array
+    temperature: float
+
+
+class AnnealingEmitter(WorkspaceEmitter):
     """Population annealing from random elites: walks that cool together and are replaced by better ones, in cycles.
 
     A climb that only ever accepts better layouts ends where every single change is for the worse, and most changes to a
@@ -70,12 +85,10 @@ class AnnealingEmitter(EmitterBase):
         cycles: Cycles begun so far, those side by side as one.
     """
 
-    emits_valid = True
-
     def __init__(
         self,
         archive: ArchiveBase,
-        workspace: Any,
+        workspace: Workspace,
         *,
         chains: int | None = None,
         cycle: int | None = None,
@@ -85,24 +98,15 @@ class AnnealingEmitter(EmitterBase):
         cold: float = 0.03,
         evaluations: int | None = None,
         initial: int = 1000,
-        seed: int | np.random.SeedSequence | None = None,
+        seed: Seed = None,
     ) -> None:
-        for name, value in (("chains", chains), ("cycle", cycle), ("groups", groups), ("initial", initial)):
-            if value is not None and value < 1:
-                raise ValueError(f"{name} must be at least 1, got {value}")
-        if resamplings < 0:
-            raise ValueError(f"resamplings must not be negative, got {resamplings}")
+        check_at_least(1, chains=chains, cycle=cycle, groups=groups, initial=initial)
+        check_at_least(0, resamplings=resamplings)
         if not heat > 0:
             raise ValueError(f"heat must be positive, got {heat}")
         if not 0 < cold <= 1:
             raise ValueError(f"cold must be above 0 and at most 1, got {cold}")
-        super().__init__(
-            archive,
-            solution_dim=archive.solution_dim,
-            bounds=None,
-            lower_bounds=workspace.lower_bounds,
-            upper_bounds=workspace.upper_bounds,
-        )
+        super().__init__(archive, workspace, seed=seed)
         size = int(archive.solution_dim)
         planned_cycle, planned_groups = _plan(evaluations, int(initial), size)
         self.cycle = planned_cycle if cycle is None else int(cycle)
@@ -110,11 +114,9 @@ class AnnealingEmitter(EmitterBase):
         self.chains = max(4, min(_CHAINS, self.cycle // _STEPS)) if chains is None else int(chains)
         self.cycles = 0
         self._heat, self._cold, self._resamplings = float(heat), float(cold), int(resamplings)
-        self._workspace = workspace
         self._initial = int(initial)
-        self._rng = np.random.default_rng(seed)
         # One row per walk, group by group: where it stands and what that scores.
-        self._genomes = np.zeros((self.groups * self.chains, size), dtype=archive.dtypes["solution"])
+        self._genomes = self._blank_genomes(self.groups * self.chains)
         self._scores: Array = np.zeros(self.groups * self.chains)
         self._steps = max(1, self.cycle // self.chains)
         self._step = 0
@@ -133,6 +135,14 @@ class AnnealingEmitter(EmitterBase):
             "heat": self._heat,
             "cold": self._cold,
         }
+
+    @property
+    def state(self) -> Chains:
+        """Where every chain stands now; a copy."""
+        shape = self.groups, self.chains
+        return Chains(
+            read_only(self._genomes.reshape(*shape, -1)), read_only(self._scores.reshape(shape)), self.temperature
+        )
 
     @property
     def temperature(self) -> float:
@@ -162,18 +172,10 @@ class AnnealingEmitter(EmitterBase):
         solution: npt.ArrayLike,
         objective: npt.ArrayLike,
         measures: npt.ArrayLike,
-        add_info: dict[str, npt.NDArray[Any]],
+        add_info: AddInfo,
         **fields: npt.ArrayLike,
     ) -> None:
-        """Let every walk accept its step or stay.
-
-        Args:
-            solution: ``(groups * chains, d)`` what ``ask`` proposed.
-            objective: ``(groups * chains,)`` scores, NaN where a layout is not allowed; no walk goes there.
-            measures: Not used.
-            add_info: Not used.
-            **fields: Not used.
-        """
+        """Let every chain accept its step or stay; no chain goes where the score is NaN."""
         if not self._asked:
             return
         scores = np.asarray(objective, dtype=np.float64)

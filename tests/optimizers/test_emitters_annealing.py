@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from legible_envs.overcooked import OvercookedWorkspace
 from optimizers import AnnealingEmitter, make_archive, search
-from optimizers.emitters.mutation import crossed, draw_elites, perturbed
+from optimizers.emitters.draws import crossed, draw_elites, perturbed
 from optimizers.evaluator import Evaluator
 from tests.support.shelf_workspace import ShelfWorkspace
 

@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from legible_envs.overcooked import OvercookedWorkspace
-from optimizers.emitters.random_keys import BoundedKeys, KitchenKeys, random_keys
+from legible_envs.overcooked.design.keys import KitchenKeys
+from legible_envs.random_keys import BoundedKeys
 from tests.support.shelf_workspace import ShelfWorkspace
 
 SHELF = ShelfWorkspace()
@@ -19,7 +20,7 @@ KITCHENS = [
 
 @pytest.mark.parametrize("workspace", KITCHENS, ids=["5x5", "5x9-ruled", "9x9"])
 def test_kitchens_and_keys_there_and_back(workspace):
-    keys = random_keys(workspace)
+    keys = workspace.key_decoder()
     assert isinstance(keys, KitchenKeys)
     rng = np.random.default_rng(0)
     genomes = workspace.sample(300, rng)
@@ -64,12 +65,12 @@ def literal_kitchen(workspace, keys):
 @given(st.integers(0, 2**32 - 1), st.sampled_from([KITCHENS[0], KITCHENS[2]]))
 def test_the_kernel_reads_kitchens_as_its_rules_say(seed, workspace):
     keys = np.random.default_rng(seed).random((1, workspace.genome_size))
-    decoded = random_keys(workspace).decode(keys, np.zeros((1, 0)), np.random.default_rng(0))
+    decoded = workspace.key_decoder().decode(keys, np.zeros((1, 0)), np.random.default_rng(0))
     np.testing.assert_array_equal(decoded[0], literal_kitchen(workspace, keys[0]))
 
 
 def test_keys_of_any_workspace_are_its_genes_and_are_repaired_with_the_anchor():
-    keys = random_keys(SHELF)
+    keys = SHELF.key_decoder()
     assert isinstance(keys, BoundedKeys)
     genomes = SHELF.all_genomes()
     np.testing.assert_array_equal(keys.decode(keys.encode(genomes), genomes, np.random.default_rng(0)), genomes)
