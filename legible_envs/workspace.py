@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import inspect
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, get_args
 
@@ -172,7 +172,9 @@ class Workspace(ABC):
     def simplifications(self, genome: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """``(m, d)`` genomes that each lack one obstacle of the given ``(d,)`` one."""
 
-    def prune(self, genome: npt.NDArray[Any], objective: Objective | None = None) -> npt.NDArray[Any]:
+    def prune(
+        self, genome: npt.NDArray[Any], objective: Callable[[npt.NDArray[Any]], Array] | None = None
+    ) -> npt.NDArray[Any]:
         """Remove obstacles one by one as long as that does not lower the objective.
 
         Args:

@@ -6,21 +6,24 @@ so that scoring can be spread over machines without an emitter noticing.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
 import numpy.typing as npt
 
+from legible_envs.workspace import ObjectiveName, Workspace
+
 if TYPE_CHECKING:
     from distributed import Client
-
-
-import time
-from collections.abc import Callable
 
 __all__ = ["LEAST", "ClusterObjective", "Evaluator", "Objective", "connect"]
 
 Objective = Callable[[npt.NDArray[Any]], npt.NDArray[np.float64]]
+
+LEAST: Final = 256
+"""A batch is split only into parts of at least so many genomes: fewer are not worth a message."""
 
 
 class Evaluator:
@@ -41,7 +44,7 @@ class Evaluator:
 
     def __init__(
         self,
-        workspace: Any,
+        workspace: Workspace,
         objective: str | Objective = "legibility",
         max_distance: float | None = None,
         scheduler: str | None = None,
@@ -51,7 +54,7 @@ class Evaluator:
         self.seconds = 0.0
         if isinstance(objective, str):
             self.name = objective
-            self._score: Objective = workspace.objective(objective, max_distance=max_distance)
+            self._score: Objective = workspace.objective(cast("ObjectiveName", objective), max_distance=max_distance)
             self._cap_here = False
         elif callable(objective):
             self.name = _name_of(objective)
@@ -130,10 +133,6 @@ def _name_of(objective: Objective) -> str:
         return name
     kind = objective if hasattr(objective, "__qualname__") else type(objective)
     return f"{kind.__module__}:{kind.__qualname__}"
-
-
-LEAST: Final = 256
-"""Fewer genomes than this are not worth a message."""
 
 
 def connect(scheduler: str, timeout: float = 10.0) -> Client:

@@ -15,6 +15,7 @@ import numpy as np
 from ribs.schedulers import Scheduler
 
 from legible_envs.support.files import remove_leftovers
+from legible_envs.workspace import Workspace
 from optimizers.archives import WorkspaceArchive, make_archive, write_archive
 from optimizers.emitters.registry import EmitterSpec, emitter_name, make_emitter
 from optimizers.errors import CheckpointError, EmitterError, SearchError
@@ -23,7 +24,7 @@ from optimizers.runs.checkpoint import CheckpointFolder, Header
 from optimizers.runs.folder import RunFolder, git_revision, package_versions, pickle_versions, platform_name
 from optimizers.runs.result import SearchResult
 
-__all__ = ["Run", "SearchState"]
+__all__ = ["SearchRun", "SearchState"]
 
 _ROWS = 1000
 _ROW_EVERY = 1000
@@ -56,10 +57,10 @@ class SearchState:
 
 
 @dataclass
-class Run:
-    """One search: its settings, and its state between batches."""
+class SearchRun:
+    """One search under way: its settings, and its state between batches."""
 
-    workspace: Any
+    workspace: Workspace
     evaluator: Evaluator
     emitters: list[tuple[EmitterSpec, dict[str, Any]]]
     evaluations: int | None
@@ -274,7 +275,7 @@ class Run:
                 "platform": platform_name(),
                 **self._settings,
                 "emitter": emitters[0] if len(emitters) == 1 else emitters,
-                "calibration": getattr(self.workspace, "calibration", None),
+                "calibration": self.workspace.calibration,
             }
         )
 
@@ -283,7 +284,7 @@ class Run:
         genome, score, removed = None, None, False
         if elite is not None:
             genome, score = np.array(elite["solution"]), float(elite["objective"])
-            if prune and hasattr(self.workspace, "prune"):
+            if prune:
                 genome = np.asarray(self.workspace.prune(genome, self.evaluator.score))
                 removed = not np.array_equal(genome, elite["solution"])
                 score = float(self.evaluator.score(genome[None])[0]) if removed else score

@@ -13,13 +13,14 @@ from typing import Any, Literal
 
 import numpy as np
 
+from legible_envs.workspace import Workspace
 from optimizers.emitters.registry import EmitterSpec
 from optimizers.errors import SearchInterrupted
 from optimizers.evaluator import Evaluator, Objective
 from optimizers.progress import Progress
 from optimizers.runs.folder import RunFolder
 from optimizers.runs.result import SearchResult
-from optimizers.search_run import Run, SearchState
+from optimizers.search_run import SearchRun, SearchState
 
 __all__ = ["Callback", "SearchState", "search"]
 
@@ -30,7 +31,7 @@ Callback = Callable[[SearchState], object]
 
 
 def search(
-    workspace: Any,
+    workspace: Workspace,
     *,
     objective: str | Objective = "legibility",
     emitter: EmitterSpec | Sequence[EmitterSpec] = "improve",
@@ -99,7 +100,7 @@ def search(
     if iterations is None:
         evaluations = _DEFAULT_EVALUATIONS if evaluations is None else evaluations
     _check_budget(evaluations, iterations, initial, resume, checkpoint)
-    run = Run(
+    run = SearchRun(
         workspace=workspace,
         evaluator=Evaluator(workspace, objective, max_distance, scheduler),
         emitters=_paired(emitter, emitter_options),
@@ -116,7 +117,7 @@ def search(
 
 
 def _conduct(
-    run: Run,
+    run: SearchRun,
     callbacks: Sequence[Callback],
     time_limit: float | None,
     progress: bool | None,
@@ -139,7 +140,7 @@ def _conduct(
 
 
 def _loop(
-    run: Run,
+    run: SearchRun,
     bar: Progress,
     callbacks: Sequence[Callback],
     deadline: float | None,

@@ -39,6 +39,7 @@ from typing import Any
 import numpy as np
 
 from legible_envs.support.plugins import Plugin, Registry, target_of
+from legible_envs.workspace import Workspace
 from optimizers.errors import EmitterError
 
 __all__ = ["ENTRY_POINT_GROUP", "EmitterInfo", "EmitterSpec", "emitter_name", "list_emitters", "make_emitter"]
@@ -103,7 +104,7 @@ def emitter_name(spec: EmitterSpec) -> str:
 def make_emitter(
     spec: EmitterSpec,
     archive: Any,
-    workspace: Any,
+    workspace: Workspace,
     *,
     seed: int,
     evaluations: int | None = None,
