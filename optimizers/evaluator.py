@@ -1,6 +1,6 @@
 """The seam between searching and scoring: genomes in, objective and measures out.
 
-Everything that proposes layouts stands on one side of :class:`Evaluator`, everything that judges them on the other,
+Everything that proposes layouts stands on one side of :class:`Evaluator`, everything that scores them on the other,
 so that scoring can be spread over machines without an emitter noticing.
 """
 
@@ -33,8 +33,8 @@ class Evaluator:
         workspace: The design problem.
         objective: Name known to ``workspace.objective``, or any callable from ``(n, d)`` genomes to ``(n,)`` numbers to
             be maximised. NaN and negative infinity mean "not allowed": such a layout never enters an archive.
-        max_distance: Layouts that make the person walk farther than this (floor moves, expected over one task
-            execution) score NaN.
+        max_distance: Layouts whose expected distance over one task execution (floor moves, metres) is greater
+            score NaN.
         scheduler: Address of a Dask scheduler whose workers share the scoring; None scores in this process.
 
     Attributes:
@@ -144,7 +144,7 @@ def connect(scheduler: str, timeout: float = 10.0) -> Client:
 
     Raises:
         ImportError: Dask is not installed; the message says how to get it.
-        ConnectionError: Nobody answers at that address.
+        ConnectionError: No scheduler answers at that address.
     """
     try:
         from distributed import Client

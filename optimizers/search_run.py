@@ -12,6 +12,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from ribs.schedulers import Scheduler
 
 from legible_envs.support.files import remove_leftovers
@@ -171,7 +172,7 @@ class SearchRun:
             self._log()
         self._consistent = True
 
-    def _add_initial(self) -> Any:
+    def _add_initial(self) -> npt.NDArray[Any]:
         """Score and archive the random layouts every search begins with."""
         n = self.initial if self.evaluations is None else min(self.initial, self.evaluations)
         genomes = self.workspace.sample(n, np.random.default_rng(self._initial_seed))
@@ -180,7 +181,7 @@ class SearchRun:
             raise SearchError(f"none of {n:,} random layouts has a score to climb from; is max_distance too small?")
         return genomes
 
-    def _add_proposed(self) -> Any:
+    def _add_proposed(self) -> npt.NDArray[Any]:
         """Let the emitters propose, score, and tell them."""
         genomes = self.state.scheduler.ask()
         if not len(genomes):
@@ -341,9 +342,9 @@ class SearchRun:
 def _as_json(data: Mapping[str, Any]) -> dict[str, Any]:
     """Plain data that reads back from JSON as it is; anything else by a description that is the same next time."""
 
-    def describe(thing: Any) -> Any:
-        if isinstance(thing, np.generic | np.ndarray):
-            return thing.tolist()
-        return emitter_name(thing)
+    def describe(value: Any) -> Any:
+        if isinstance(value, np.generic | np.ndarray):
+            return value.tolist()
+        return emitter_name(value)
 
     return json.loads(json.dumps(data, default=describe))

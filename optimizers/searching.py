@@ -69,7 +69,7 @@ def search(
         seed: Seed of everything random; archive and emitters get child seeds of one ``SeedSequence``. None draws one,
             which the manifest then names.
         initial: Random layouts scored first (20 % obstacles in a kitchen). ``iterations`` overrides it.
-        max_distance: Layouts with a longer expected walk are not allowed.
+        max_distance: Layouts whose expected distance over one task execution is greater are not allowed.
         emitter_options: Keyword arguments of the emitter, or one mapping per emitter.
         checkpoint: Folder of the run; everything in :mod:`.folder` is written there. None writes nothing.
         resume: True continues the run in that folder and fails if there is none; ``"auto"`` begins one if there is
@@ -91,7 +91,7 @@ def search(
         CheckpointError: A checkpoint cannot be written, read or continued.
         SearchError: The folder holds a run already, or the search cannot go on.
         EmitterError: The emitter is unknown or breaks the contract.
-        ConnectionError: Nobody answers at the address of ``scheduler``.
+        ConnectionError: No scheduler answers at the address ``scheduler``.
 
         Any exception raised after the search began has an attribute ``partial``: the result so far.
     """
@@ -123,7 +123,7 @@ def _conduct(
     progress: bool | None,
     checkpoint: str | Path | None,
 ) -> SearchResult:
-    """Search until something ends it; whatever happens, what was found is kept."""
+    """Search until something ends it; the error of one that fails carries what was found."""
     deadline = None if time_limit is None else time.monotonic() + time_limit
     with _interrupts() as interrupted, Progress(*run.goal(), show=progress) as bar:
         try:

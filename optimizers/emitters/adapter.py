@@ -89,6 +89,10 @@ class GenomeAdapter(WorkspaceEmitter):
         name: What to call it in errors.
         seed: Seed of the random layouts.
         initial: Random layouts proposed while the archive is empty.
+
+    Attributes:
+        emitter: The emitter that is adapted.
+        raw: ``(n, d)`` what it proposed last, before rounding, clipping and filtering; None for random layouts.
     """
 
     def __init__(
@@ -106,7 +110,7 @@ class GenomeAdapter(WorkspaceEmitter):
         self._name = name
         self._initial = initial
         self._worst = np.inf
-        self._raw: npt.NDArray[Any] | None = None
+        self.raw: npt.NDArray[Any] | None = None
         self._kept = np.zeros(0, dtype=bool)
 
     def __getattr__(self, name: str) -> Any:
@@ -122,7 +126,7 @@ class GenomeAdapter(WorkspaceEmitter):
             EmitterError: The emitter proposed an array of a wrong shape, or nothing valid in 100 batches.
         """
         if self.archive.empty:
-            self._raw = None
+            self.raw = None
             return self._workspace.sample(self._initial, self._rng)
         for _ in range(_PATIENCE):
             raw = np.asarray(self.emitter.ask())
@@ -132,7 +136,7 @@ class GenomeAdapter(WorkspaceEmitter):
                     f"it returned {raw.dtype} of shape {raw.shape}"
                 )
             genomes = self.to_genomes(raw)
-            self._raw, self._kept = raw, np.asarray(self._workspace.valid(genomes), dtype=bool)
+            self.raw, self._kept = raw, np.asarray(self._workspace.valid(genomes), dtype=bool)
             if self._kept.any() or not len(raw):
                 return genomes[self._kept]
             self.tell(genomes[:0], np.zeros(0), np.zeros((0, len(self.archive.lower_bounds))), {})
@@ -156,7 +160,7 @@ class GenomeAdapter(WorkspaceEmitter):
         **fields: npt.ArrayLike,
     ) -> None:
         """Hand the results back to the emitter, in its own order and numbers."""
-        if self._raw is None:
+        if self.raw is None:
             return
         scores = np.asarray(objective, dtype=np.float64)
         scored = ~np.isnan(scores)
@@ -165,7 +169,7 @@ class GenomeAdapter(WorkspaceEmitter):
         worst = self._worst if np.isfinite(self._worst) else float(self.archive.qd_score_offset)
         best = float(self.archive.stats.obj_max) if self.archive.stats.obj_max is not None else worst
         rows = np.flatnonzero(self._kept)[scored]
-        n = len(self._raw)
+        n = len(self.raw)
         whole_scores = np.full(n, worst)
         whole_scores[rows] = scores[scored]
         whole_measures = np.tile(np.asarray(self.archive.lower_bounds, dtype=np.float64), (n, 1))
@@ -174,7 +178,7 @@ class GenomeAdapter(WorkspaceEmitter):
         for name in ("status", "value"):
             if name in add_info:
                 info[name][rows] = np.asarray(add_info[name])[scored]
-        self.emitter.tell(self._raw, whole_scores, whole_measures, info)
+        self.emitter.tell(self.raw, whole_scores, whole_measures, info)
 
 
 class FunctionEmitter(WorkspaceEmitter):

@@ -13,7 +13,7 @@ from legible_envs.workspace import Workspace
 if TYPE_CHECKING:
     from ribs.archives import ArchiveBase
 
-__all__ = ["AddInfo", "CountingEmitter", "Seed", "WorkspaceEmitter", "check_at_least", "read_only"]
+__all__ = ["AddInfo", "CountingEmitter", "Seed", "WorkspaceEmitter", "check_at_least", "read_only", "seed_sequence"]
 
 Seed = int | np.random.SeedSequence | None
 AddInfo = dict[str, npt.NDArray[Any]]
@@ -110,6 +110,11 @@ def check_at_least(least: int, **counts: int | None) -> None:
     for name, value in counts.items():
         if value is not None and value < least:
             raise ValueError(f"{name} must be at least {least}, got {value}")
+
+
+def seed_sequence(seed: Seed) -> np.random.SeedSequence:
+    """A seed as a sequence, to spawn others from."""
+    return seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
 
 
 def read_only(values: npt.NDArray[Any]) -> npt.NDArray[Any]:

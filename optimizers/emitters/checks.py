@@ -116,7 +116,7 @@ class _Trial:
     def _proposal_fits(self, genomes: npt.NDArray[Any]) -> bool:
         """Check shape, type, bounds and validity of a batch."""
         size, dtype = self.workspace.genome_size, np.dtype(self.workspace.genome_dtype)
-        raw = self.emitter._raw if self._adapted and self.emitter._raw is not None else genomes
+        raw = self.emitter.raw if self._adapted and self.emitter.raw is not None else genomes
         found = len(self.problems)
         if genomes.ndim != 2 or genomes.shape[1] != size:
             self.problems.append(f"ask() must return shape (n, {size}), it returned {genomes.shape}")

@@ -12,7 +12,7 @@ from ribs.emitters import EvolutionStrategyEmitter
 from legible_envs.random_keys import KeyDecoder
 from legible_envs.workspace import Workspace
 from optimizers.emitters.adapter import FloatArchiveView, GenomeAdapter
-from optimizers.emitters.base import Seed, check_at_least, read_only
+from optimizers.emitters.base import Seed, check_at_least, read_only, seed_sequence
 from optimizers.emitters.draws import draw_elites
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ class _KeyStrategies(GenomeAdapter):
         if strategies is None:
             planned = _MOST if evaluations is None else evaluations // (_ROUNDS * batch_size)
             strategies = max(1, min(_MOST, planned))
-        team_seed, own_seed = _sequence(seed).spawn(2)
+        team_seed, own_seed = seed_sequence(seed).spawn(2)
         team = _Team(archive, workspace, strategies, batch_size, float(sigma0), learning_rate, team_seed)
         super().__init__(archive, workspace, team, name=name, seed=own_seed, initial=initial)
 
@@ -277,7 +277,3 @@ class _Team:
                     **options,
                 )
             )
-
-
-def _sequence(seed: Seed) -> np.random.SeedSequence:
-    return seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)

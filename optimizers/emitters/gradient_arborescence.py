@@ -10,7 +10,7 @@ from ribs.emitters import GradientArborescenceEmitter as RibsGradientArborescenc
 
 from legible_envs.workspace import Workspace
 from optimizers.emitters.adapter import FloatArchiveView, GenomeAdapter
-from optimizers.emitters.base import Seed, check_at_least
+from optimizers.emitters.base import Seed, check_at_least, seed_sequence
 
 if TYPE_CHECKING:
     from ribs.archives import ArchiveBase
@@ -87,7 +87,7 @@ class GradientArborescenceEmitter(GenomeAdapter):
         # Whether there are gradients, and of this objective, shows before anything is scored.
         differentiable = cast("DifferentiableWorkspace", workspace)
         differentiable.gradients(np.empty((0, archive.solution_dim)), objective)
-        own, seeds = (seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)).spawn(2)
+        own, seeds = seed_sequence(seed).spawn(2)
         tree = _Tree(archive, differentiable, objective, float(sigma0), float(lr), int(batch_size), seeds)
         super().__init__(archive, workspace, tree, name="gradient-arborescence", seed=own, initial=initial)
 

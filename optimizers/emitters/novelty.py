@@ -41,7 +41,7 @@ class Generation(NamedTuple):
 
 
 class NoveltyLocalCompetitionEmitter(WorkspaceEmitter):
-    """Novelty search with local competition: be different from others, and better than those who are alike.
+    """Novelty search with local competition: be different from others, and better than those that are alike.
 
     A population is bred as in NSGA-II (Deb et al., 2002) for two objectives (Lehman & Stanley, GECCO 2011): *novelty*,
     the mean distance of a layout's measures to its ``neighbours`` nearest ones in the population and in a list of past
@@ -182,15 +182,15 @@ def novelty_and_competition(measures: Floats, scores: Floats, past: Floats, neig
     n = len(measures)
     if n == 1:
         return np.zeros((1, 2))
-    everyone = np.concatenate([measures, past])
-    squares = np.zeros((n, len(everyone)))
-    for mine, theirs in zip(measures.T, everyone.T, strict=True):
+    population_and_past = np.concatenate([measures, past])
+    squares = np.zeros((n, len(population_and_past)))
+    for mine, theirs in zip(measures.T, population_and_past.T, strict=True):
         squares += (mine[:, None] - theirs) ** 2
     np.fill_diagonal(squares, np.inf)
     k = min(neighbours, n - 1)
     nearest = np.argpartition(squares[:, :n], k - 1, axis=1)[:, :k]
     outscored = (scores[nearest] < scores[:, None]).sum(axis=1)
-    k = min(neighbours, len(everyone) - 1)
+    k = min(neighbours, len(population_and_past) - 1)
     novelty = np.sqrt(np.partition(squares, k - 1, axis=1)[:, :k]).mean(axis=1)
     return np.column_stack([novelty, outscored])
 
@@ -198,15 +198,15 @@ def novelty_and_competition(measures: Floats, scores: Floats, past: Floats, neig
 def pareto_ranks(objectives: Floats) -> npt.NDArray[np.int64]:
     """Non-dominated sorting of two objectives, both maximised.
 
-    By descending first objective, an individual belongs to the first front of which nobody dominates it, and of each
-    front only the greatest second objective so far has to be known; fronts are ordered by it, so that it is found by
-    bisection (Jensen, 2003): ``O(n log n)``.
+    Taken by descending first objective, an individual belongs to the first front without a member that dominates it.
+    Of each front only the greatest second objective so far has to be known, and fronts are ordered by it, so that the
+    front is found by bisection (Jensen, 2003): ``O(n log n)``.
 
     Args:
         objectives: ``(n, 2)``.
 
     Returns:
-        ``(n,)`` rank: 0 dominated by nobody, 1 by rank 0 alone, and so on.
+        ``(n,)`` rank: 0 where no other dominates it, 1 where only rank 0 does, and so on.
     """
     first, second = objectives[:, 0], objectives[:, 1]
     order = np.lexsort((-second, -first))
@@ -219,7 +219,7 @@ def pareto_ranks(objectives: Floats) -> npt.NDArray[np.int64]:
         if point == previous:  # equals do not dominate one another
             ranks[i] = ranks[last]
             continue
-        # Everybody before has a first objective at least as great, so a front dominates where its top is as high.
+        # All before have a first objective at least as great, so a front dominates where its top is as high.
         rank = bisect_right(tops, -point[1])
         if rank == len(tops):
             tops.append(-point[1])

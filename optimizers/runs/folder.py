@@ -1,4 +1,4 @@
-"""The folder of a run: what a search leaves behind for people, reports and later sessions.
+"""The folder of a run: what a search leaves behind to look at, to report on and to continue from.
 
 =============== ======================================================================================================
 ``config.json`` the manifest: versions, settings, seed, git revision, and the result once there is one
