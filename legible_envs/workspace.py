@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import inspect
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
 
+from legible_envs.random_keys import BoundedKeys, KeyDecoder
 from legible_envs.support.plugins import Registry
 
 if TYPE_CHECKING:
@@ -96,6 +97,13 @@ class Workspace(ABC):
     def valid(self, genomes: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
         """``(n,)`` which genomes are valid layouts."""
 
+    def key_decoder(self) -> KeyDecoder:
+        """How vectors of real numbers in [0, 1] stand for layouts (random keys); by default each key is one gene.
+
+        A workspace where :class:`~legible_envs.random_keys.BoundedKeys` must repair many layouts overrides this.
+        """
+        return BoundedKeys(self)
+
     # -- what they score -------------------------------------------------------------------------------------------
 
     @abstractmethod
@@ -164,7 +172,9 @@ class Workspace(ABC):
     def simplifications(self, genome: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """``(m, d)`` genomes that each lack one obstacle of the given ``(d,)`` one."""
 
-    def prune(self, genome: npt.NDArray[Any], objective: Objective | None = None) -> npt.NDArray[Any]:
+    def prune(
+        self, genome: npt.NDArray[Any], objective: Callable[[npt.NDArray[Any]], Array] | None = None
+    ) -> npt.NDArray[Any]:
         """Remove obstacles one by one as long as that does not lower the objective.
 
         Args:

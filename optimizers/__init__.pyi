@@ -1,5 +1,6 @@
 from .archives import WorkspaceArchive, make_archive
 from .emitters.annealing import AnnealingEmitter
+from .emitters.base import WorkspaceEmitter
 from .emitters.checks import check_emitter
 from .emitters.covariance import CmaMaeEmitter, CmaMeEmitter
 from .emitters.differential_evolution import DifferentialEvolutionEmitter
@@ -11,7 +12,8 @@ from .emitters.random import RandomWorkspaceEmitter
 from .emitters.registry import list_emitters, make_emitter, register_emitter
 from .errors import CheckpointError, EmitterError, SearchError, SearchInterrupted
 from .evaluator import Evaluator
-from .runs.result import SearchResult, load_run
+from .runs.folder import is_run_folder
+from .runs.result import Elites, SearchResult, load_run
 from .searching import search
 
 __all__ = [
@@ -20,6 +22,7 @@ __all__ = [
     "CmaMaeEmitter",
     "CmaMeEmitter",
     "DifferentialEvolutionEmitter",
+    "Elites",
     "EmitterError",
     "Evaluator",
     "GradientArborescenceEmitter",
@@ -31,7 +34,9 @@ __all__ = [
     "SearchInterrupted",
     "SearchResult",
     "WorkspaceArchive",
+    "WorkspaceEmitter",
     "check_emitter",
+    "is_run_folder",
     "list_emitters",
     "load_run",
     "make_archive",

@@ -12,6 +12,8 @@ import numpy.typing as npt
 from ribs.archives import GridArchive
 
 from legible_envs.support.files import write_npz
+from legible_envs.workspace import Workspace
+from optimizers.errors import SearchError
 
 if TYPE_CHECKING:
     from ribs.archives import ArchiveBase
@@ -61,7 +63,7 @@ class WorkspaceArchive(GridArchive):
 
 
 def make_archive(
-    workspace: Any,
+    workspace: Workspace,
     *,
     seed: int | np.random.SeedSequence | None = None,
     score_floor: float | None = None,
@@ -103,18 +105,24 @@ def write_archive(path: Path, archive: ArchiveBase) -> None:
 
 
 def read_archive(path: Path) -> dict[str, npt.NDArray[Any]]:
-    """Read what :func:`write_archive` wrote.
+    """Read what :func:`write_archive` wrote; nothing is unpickled.
 
     Raises:
-        ValueError: The file is not such an archive.
+        FileNotFoundError: There is no such file.
+        SearchError: The file is not such an archive.
     """
+    refusal = f"{path} is not an archive written by a search, or it is damaged"
     try:
         with np.load(path, allow_pickle=False) as stored:
+            missing = [name for name in FIELDS if name not in stored]
+            if missing:
+                raise SearchError(f"{refusal}: it lacks the arrays {missing}, it has {sorted(stored)}")
             arrays = {name: stored[name] for name in FIELDS}
     except FileNotFoundError:
         raise
     except (ValueError, KeyError, OSError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-        raise ValueError(f"{path} is not an archive written by a search ({error})") from error
-    if len({len(values) for values in arrays.values()}) != 1:
-        raise ValueError(f"{path} is not an archive written by a search (arrays of different lengths)")
+        raise SearchError(f"{refusal}: {error}") from error
+    lengths = {name: len(values) for name, values in arrays.items()}
+    if len(set(lengths.values())) != 1:
+        raise SearchError(f"{refusal}: its arrays have different lengths {lengths}")
     return arrays

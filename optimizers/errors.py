@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from optimizers.runs.result import SearchResult
+from typing import Any
 
 __all__ = ["CheckpointError", "EmitterError", "SearchError", "SearchInterrupted"]
 
 
 class SearchError(RuntimeError):
-    """A search could not go on.
+    """A search could not go on, or its folder cannot be read; the message names the file and what is wrong with it.
 
     Attributes:
         partial: The :class:`~optimizers.SearchResult` at that moment, or None where nothing had been found.
     """
 
-    def __init__(self, message: str, *, partial: SearchResult | None = None) -> None:
+    def __init__(self, message: str, *, partial: Any = None) -> None:
         super().__init__(message)
         self.partial = partial
 
@@ -34,7 +31,7 @@ class SearchInterrupted(KeyboardInterrupt):
         partial: The :class:`~optimizers.SearchResult` at that moment.
     """
 
-    def __init__(self, message: str, *, partial: SearchResult | None = None) -> None:
+    def __init__(self, message: str, *, partial: Any = None) -> None:
         super().__init__(message)
         self.partial = partial
 

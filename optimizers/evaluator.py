@@ -1,26 +1,29 @@
 """The seam between searching and scoring: genomes in, objective and measures out.
 
-Everything that proposes layouts stands on one side of :class:`Evaluator`, everything that judges them on the other,
+Everything that proposes layouts stands on one side of :class:`Evaluator`, everything that scores them on the other,
 so that scoring can be spread over machines without an emitter noticing.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
 import numpy.typing as npt
 
+from legible_envs.workspace import ObjectiveName, Workspace
+
 if TYPE_CHECKING:
     from distributed import Client
-
-
-import time
-from collections.abc import Callable
 
 __all__ = ["LEAST", "ClusterObjective", "Evaluator", "Objective", "connect"]
 
 Objective = Callable[[npt.NDArray[Any]], npt.NDArray[np.float64]]
+
+LEAST: Final = 256
+"""A batch is split only into parts of at least so many genomes: fewer are not worth a message."""
 
 
 class Evaluator:
@@ -30,8 +33,8 @@ class Evaluator:
         workspace: The design problem.
         objective: Name known to ``workspace.objective``, or any callable from ``(n, d)`` genomes to ``(n,)`` numbers to
             be maximised. NaN and negative infinity mean "not allowed": such a layout never enters an archive.
-        max_distance: Layouts that make the person walk farther than this (floor moves, expected over one task
-            execution) score NaN.
+        max_distance: Layouts whose expected distance over one task execution (floor moves, metres) is greater
+            score NaN.
         scheduler: Address of a Dask scheduler whose workers share the scoring; None scores in this process.
 
     Attributes:
@@ -41,7 +44,7 @@ class Evaluator:
 
     def __init__(
         self,
-        workspace: Any,
+        workspace: Workspace,
         objective: str | Objective = "legibility",
         max_distance: float | None = None,
         scheduler: str | None = None,
@@ -51,7 +54,7 @@ class Evaluator:
         self.seconds = 0.0
         if isinstance(objective, str):
             self.name = objective
-            self._score: Objective = workspace.objective(objective, max_distance=max_distance)
+            self._score: Objective = workspace.objective(cast("ObjectiveName", objective), max_distance=max_distance)
             self._cap_here = False
         elif callable(objective):
             self.name = _name_of(objective)
@@ -132,10 +135,6 @@ def _name_of(objective: Objective) -> str:
     return f"{kind.__module__}:{kind.__qualname__}"
 
 
-LEAST: Final = 256
-"""Fewer genomes than this are not worth a message."""
-
-
 def connect(scheduler: str, timeout: float = 10.0) -> Client:
     """A client of a running scheduler.
 
@@ -145,7 +144,7 @@ def connect(scheduler: str, timeout: float = 10.0) -> Client:
 
     Raises:
         ImportError: Dask is not installed; the message says how to get it.
-        ConnectionError: Nobody answers at that address.
+        ConnectionError: No scheduler answers at that address.
     """
     try:
         from distributed import Client

@@ -12,9 +12,11 @@ from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from ribs.schedulers import Scheduler
 
 from legible_envs.support.files import remove_leftovers
+from legible_envs.workspace import Workspace
 from optimizers.archives import WorkspaceArchive, make_archive, write_archive
 from optimizers.emitters.registry import EmitterSpec, emitter_name, make_emitter
 from optimizers.errors import CheckpointError, EmitterError, SearchError
@@ -23,7 +25,7 @@ from optimizers.runs.checkpoint import CheckpointFolder, Header
 from optimizers.runs.folder import RunFolder, git_revision, package_versions, pickle_versions, platform_name
 from optimizers.runs.result import SearchResult
 
-__all__ = ["Run", "SearchState"]
+__all__ = ["SearchRun", "SearchState"]
 
 _ROWS = 1000
 _ROW_EVERY = 1000
@@ -56,10 +58,10 @@ class SearchState:
 
 
 @dataclass
-class Run:
-    """One search: its settings, and its state between batches."""
+class SearchRun:
+    """One search under way: its settings, and its state between batches."""
 
-    workspace: Any
+    workspace: Workspace
     evaluator: Evaluator
     emitters: list[tuple[EmitterSpec, dict[str, Any]]]
     evaluations: int | None
@@ -170,7 +172,7 @@ class Run:
             self._log()
         self._consistent = True
 
-    def _add_initial(self) -> Any:
+    def _add_initial(self) -> npt.NDArray[Any]:
         """Score and archive the random layouts every search begins with."""
         n = self.initial if self.evaluations is None else min(self.initial, self.evaluations)
         genomes = self.workspace.sample(n, np.random.default_rng(self._initial_seed))
@@ -179,7 +181,7 @@ class Run:
             raise SearchError(f"none of {n:,} random layouts has a score to climb from; is max_distance too small?")
         return genomes
 
-    def _add_proposed(self) -> Any:
+    def _add_proposed(self) -> npt.NDArray[Any]:
         """Let the emitters propose, score, and tell them."""
         genomes = self.state.scheduler.ask()
         if not len(genomes):
@@ -274,7 +276,7 @@ class Run:
                 "platform": platform_name(),
                 **self._settings,
                 "emitter": emitters[0] if len(emitters) == 1 else emitters,
-                "calibration": getattr(self.workspace, "calibration", None),
+                "calibration": self.workspace.calibration,
             }
         )
 
@@ -283,7 +285,7 @@ class Run:
         genome, score, removed = None, None, False
         if elite is not None:
             genome, score = np.array(elite["solution"]), float(elite["objective"])
-            if prune and hasattr(self.workspace, "prune"):
+            if prune:
                 genome = np.asarray(self.workspace.prune(genome, self.evaluator.score))
                 removed = not np.array_equal(genome, elite["solution"])
                 score = float(self.evaluator.score(genome[None])[0]) if removed else score
@@ -340,9 +342,9 @@ class Run:
 def _as_json(data: Mapping[str, Any]) -> dict[str, Any]:
     """Plain data that reads back from JSON as it is; anything else by a description that is the same next time."""
 
-    def describe(thing: Any) -> Any:
-        if isinstance(thing, np.generic | np.ndarray):
-            return thing.tolist()
-        return emitter_name(thing)
+    def describe(value: Any) -> Any:
+        if isinstance(value, np.generic | np.ndarray):
+            return value.tolist()
+        return emitter_name(value)
 
     return json.loads(json.dumps(data, default=describe))

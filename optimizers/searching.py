@@ -13,13 +13,14 @@ from typing import Any, Literal
 
 import numpy as np
 
+from legible_envs.workspace import Workspace
 from optimizers.emitters.registry import EmitterSpec
 from optimizers.errors import SearchInterrupted
 from optimizers.evaluator import Evaluator, Objective
 from optimizers.progress import Progress
 from optimizers.runs.folder import RunFolder
 from optimizers.runs.result import SearchResult
-from optimizers.search_run import Run, SearchState
+from optimizers.search_run import SearchRun, SearchState
 
 __all__ = ["Callback", "SearchState", "search"]
 
@@ -30,7 +31,7 @@ Callback = Callable[[SearchState], object]
 
 
 def search(
-    workspace: Any,
+    workspace: Workspace,
     *,
     objective: str | Objective = "legibility",
     emitter: EmitterSpec | Sequence[EmitterSpec] = "improve",
@@ -68,7 +69,7 @@ def search(
         seed: Seed of everything random; archive and emitters get child seeds of one ``SeedSequence``. None draws one,
             which the manifest then names.
         initial: Random layouts scored first (20 % obstacles in a kitchen). ``iterations`` overrides it.
-        max_distance: Layouts with a longer expected walk are not allowed.
+        max_distance: Layouts whose expected distance over one task execution is greater are not allowed.
         emitter_options: Keyword arguments of the emitter, or one mapping per emitter.
         checkpoint: Folder of the run; everything in :mod:`.folder` is written there. None writes nothing.
         resume: True continues the run in that folder and fails if there is none; ``"auto"`` begins one if there is
@@ -90,7 +91,7 @@ def search(
         CheckpointError: A checkpoint cannot be written, read or continued.
         SearchError: The folder holds a run already, or the search cannot go on.
         EmitterError: The emitter is unknown or breaks the contract.
-        ConnectionError: Nobody answers at the address of ``scheduler``.
+        ConnectionError: No scheduler answers at the address ``scheduler``.
 
         Any exception raised after the search began has an attribute ``partial``: the result so far.
     """
@@ -99,7 +100,7 @@ def search(
     if iterations is None:
         evaluations = _DEFAULT_EVALUATIONS if evaluations is None else evaluations
     _check_budget(evaluations, iterations, initial, resume, checkpoint)
-    run = Run(
+    run = SearchRun(
         workspace=workspace,
         evaluator=Evaluator(workspace, objective, max_distance, scheduler),
         emitters=_paired(emitter, emitter_options),
@@ -116,13 +117,13 @@ def search(
 
 
 def _conduct(
-    run: Run,
+    run: SearchRun,
     callbacks: Sequence[Callback],
     time_limit: float | None,
     progress: bool | None,
     checkpoint: str | Path | None,
 ) -> SearchResult:
-    """Search until something ends it; whatever happens, what was found is kept."""
+    """Search until something ends it; the error of one that fails carries what was found."""
     deadline = None if time_limit is None else time.monotonic() + time_limit
     with _interrupts() as interrupted, Progress(*run.goal(), show=progress) as bar:
         try:
@@ -139,7 +140,7 @@ def _conduct(
 
 
 def _loop(
-    run: Run,
+    run: SearchRun,
     bar: Progress,
     callbacks: Sequence[Callback],
     deadline: float | None,

@@ -11,7 +11,8 @@ import click
 
 from benchmarks.console import number
 from benchmarks.presenters.base import Part, Presenter, presenter_of
-from benchmarks.runs import RunError, is_run_folder, read_config
+from optimizers.errors import SearchError
+from optimizers.runs.folder import RunFolder, is_run_folder
 
 if TYPE_CHECKING:
     from optimizers import SearchResult
@@ -52,21 +53,21 @@ def run_search(domain: str, out: Path, settings: Mapping[str, Any], given: Colle
         given: Names of those that the user gave; the others do not count where a search is continued.
 
     Raises:
-        RunError: The folder already holds a run, and nobody said what to do with it, or none to be continued.
-        SearchError: Its checkpoint cannot be continued, or the search cannot go on.
+        SearchError: The folder already holds a search and neither resume nor overwrite is set, or it holds none to
+            resume; its checkpoint cannot be continued, or the search cannot go on.
     """
     presenter = presenter_of(domain)
     if is_run_folder(out) and not (settings["resume"] or settings["overwrite"]):
-        raise RunError(
+        raise SearchError(
             f"{out} already holds a search: add --resume to continue it, --overwrite to replace it, or choose another "
             "folder with --out"
         )
     config: dict[str, Any] = {"workspace": domain}
     if settings["resume"]:
-        before = read_config(out / "config.json")
+        before = RunFolder(out).read_config()
         config = dict(before["workspace"])
         if config.get("workspace") != domain:
-            raise RunError(f"{out} holds a search of {config.get('workspace')!r}, not of {domain!r}")
+            raise SearchError(f"{out} holds a search of {config.get('workspace')!r}, not of {domain!r}")
         settings = _continued(before, settings, given)
     parts = presenter.parts({**config, **presenter.design(settings)}, settings, out)
     results = [_search_part(domain, presenter, part, settings, out) for part in parts]
@@ -133,7 +134,7 @@ def _tell(presenter: Presenter, result: SearchResult, parts: Collection[Part]) -
     written = write_pictures(result.folder)
     console = say()
     console.print(presenter.text(console, result.best_layout))
-    summary, unit = result.workspace.summary(result.best_genome), presenter.words["distance_unit"]
+    summary, unit = result.workspace.summary(result.require_genome()), presenter.words["distance_unit"]
     console.print(
         f"{result.config['objective']['name']} {number(result.best_objective, 4)} "
         f"(legibility {number(summary['score'])}, distance {number(summary['distance'], 1)} {unit}) "
@@ -148,9 +149,9 @@ def _tell(presenter: Presenter, result: SearchResult, parts: Collection[Part]) -
 def write_pictures(folder: Path) -> dict[str, Path]:
     """Write pictures and report of a run; what was written, by what it is."""
     from benchmarks.reports.search_report import write_best_image, write_report
-    from benchmarks.runs import read_run
+    from optimizers import load_run
 
-    written, run = {"picture": write_best_image(folder)}, read_run(folder)
+    written, run = {"picture": write_best_image(folder)}, load_run(folder)
     if (boards := presenter_of(str(run.config["workspace"]["workspace"])).write_boards(run)) is not None:
         written["boards"] = boards
     return {**written, "report": write_report(folder)}

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from benchmarks.runs import Run, RunError, is_run_folder, read_run
 from legible_envs.errors import LayoutError
+from optimizers.runs.folder import is_run_folder
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from legible_envs.drawing import Image
     from legible_envs.rollouts.trajectory import Trajectory
     from legible_envs.workspace import Workspace
+    from optimizers import SearchResult
     from predictors import GoalPredictor
 
 __all__ = [
@@ -189,10 +190,10 @@ class Presenter(ABC):
         """A layout as a picture."""
 
     @abstractmethod
-    def design_of_run(self, run: Run, asked: Mapping[str, Any]) -> Design:
+    def design_of_run(self, run: SearchResult, asked: Mapping[str, Any]) -> Design:
         """The best layout of a run; ``asked`` are settings of the score given on the command line."""
 
-    def write_boards(self, run: Run, path: Path | None = None) -> Path | None:
+    def write_boards(self, run: SearchResult, path: Path | None = None) -> Path | None:
         """Write the figure of what a run compares into its folder; None where there is no such figure."""
         return None
 
@@ -218,7 +219,7 @@ class Presenter(ABC):
         """How people move in a layout, as the script reads it; nothing unless a workspace has such."""
         return []
 
-    def conditions(self, run: Run) -> Sequence[Condition]:
+    def conditions(self, run: SearchResult) -> Sequence[Condition]:
         """Layouts to show side by side, found in the run's folder; none unless a workspace has such."""
         return ()
 
@@ -227,7 +228,7 @@ def presenter_of(name: str) -> Presenter:
     """The presenter of a workspace.
 
     Raises:
-        RunError: The command line cannot draw layouts of this workspace.
+        ValueError: The command line cannot draw layouts of this workspace.
     """
     if name == "overcooked":
         from benchmarks.presenters.overcooked import KitchenPresenter
@@ -237,7 +238,7 @@ def presenter_of(name: str) -> Presenter:
         from benchmarks.presenters.tabletop import TablePresenter
 
         return TablePresenter()
-    raise RunError(
+    raise ValueError(
         f"layouts of the workspace {name!r} cannot be drawn here; known: {list(DOMAINS)}. "
         "`optimizers.load_run` reads its runs"
     )
@@ -255,7 +256,7 @@ def load_design(source: str, *, prefix: Any = None, pots: int | None = None, tas
 
     Raises:
         LayoutError: The layout is malformed; the message says where.
-        RunError: The run folder lacks something.
+        SearchError: The folder of the search lacks something, or a file there is damaged.
         OSError: The file cannot be read.
     """
     from benchmarks.presenters.overcooked import kitchen_from
@@ -263,7 +264,9 @@ def load_design(source: str, *, prefix: Any = None, pots: int | None = None, tas
 
     asked = {k: v for k, v in (("prefix", prefix), ("pots", pots), ("task", task)) if v is not None}
     if source != "-" and is_run_folder(source):
-        run = read_run(source)
+        from optimizers import load_run
+
+        run = load_run(source)
         return presenter_of(str(run.config["workspace"].get("workspace"))).design_of_run(run, asked)
     name, text = read_source(source)
     if is_table(text, source):

@@ -12,7 +12,6 @@ import numpy.typing as npt
 
 from benchmarks.console import board_for, number
 from benchmarks.presenters.base import Condition, Design, Part, Presenter, as_genome, load_design, refuse
-from benchmarks.runs import Run
 from legible_envs.errors import LayoutError
 from legible_envs.overcooked.layout import OvercookedLayout
 
@@ -23,6 +22,7 @@ if TYPE_CHECKING:
     from legible_envs.drawing import Image
     from legible_envs.overcooked.recipes import Recipe
     from legible_envs.rollouts.trajectory import Trajectory
+    from optimizers import SearchResult
     from predictors import GoalPredictor
 
 __all__ = ["Kitchen", "KitchenPresenter", "boards", "kitchen_from", "load_kitchen"]
@@ -110,7 +110,7 @@ def load_kitchen(source: str, *, prefix: Any = None, pots: int | None = None) ->
 
     Raises:
         LayoutError: It is malformed, or a table.
-        RunError: The run folder lacks something.
+        SearchError: The folder of the search lacks something, or a file there is damaged.
         OSError: The file cannot be read.
     """
     design = load_design(source, prefix=prefix, pots=pots)
@@ -196,13 +196,14 @@ class KitchenPresenter(Presenter):
 
         return draw_layout(layout, tile=tile)
 
-    def design_of_run(self, run: Run, asked: Mapping[str, Any]) -> Design:
+    def design_of_run(self, run: SearchResult, asked: Mapping[str, Any]) -> Design:
         """The best kitchen of a run."""
         from legible_envs.workspace import make_workspace
 
         refuse(asked, "task", "kitchen")
         workspace = make_workspace({**run.config["workspace"], **asked}) if asked else run.workspace
-        return Kitchen(run.workspace.decode(run.best_genome), workspace, run.best_genome, "", dict(asked))
+        genome = run.require_genome()
+        return Kitchen(run.best_layout, workspace, genome, "", dict(asked))
 
     # -- the page of a report --------------------------------------------------------------------------------------
 

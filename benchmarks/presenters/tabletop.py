@@ -14,10 +14,10 @@ import numpy as np
 from benchmarks.console import number, table_text
 from benchmarks.presenters.base import Design, Part, Presenter, as_genome, load_design, read_source, refuse
 from benchmarks.presenters.tabletop_panels import CONDITIONS, LIST, beta_of, boards_of, listed, write_boards
-from benchmarks.runs import Run, is_run_folder
 from legible_envs.errors import LayoutError
 from legible_envs.support.files import write_atomically
 from legible_envs.tabletop import TabletopLayout, TabletopTask
+from optimizers.runs.folder import is_run_folder
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from legible_envs.drawing import Image
     from legible_envs.rollouts.trajectory import Trajectory
     from legible_envs.tabletop.scoring.scorer import TabletopScorer
+    from optimizers import SearchResult
     from predictors import GoalPredictor
 
 __all__ = ["TableDesign", "TablePresenter", "is_table", "load_table", "table_from"]
@@ -43,7 +44,7 @@ class TableDesign(Design):
     thing: ClassVar[str] = "table"
 
     task: TabletopTask | None = None
-    run: Run | None = None
+    run: SearchResult | None = None
 
     @property
     def _scorer(self) -> TabletopScorer:
@@ -189,7 +190,7 @@ def load_table(source: str, task: str | None = None) -> TableDesign:
 
     Raises:
         LayoutError: It is malformed, or a kitchen.
-        RunError: The run folder lacks something.
+        SearchError: The folder of the search lacks something, or a file there is damaged.
         OSError: The file cannot be read.
     """
     if source != "-" and is_run_folder(source):
@@ -289,19 +290,19 @@ class TablePresenter(Presenter):
 
         return draw_table(layout, task=workspace.task, width=960, ambiguity=True, beta=beta_of(workspace))
 
-    def write_boards(self, run: Run, path: Path | None = None) -> Path:
+    def write_boards(self, run: SearchResult, path: Path | None = None) -> Path:
         """Write the boards of the paper's figure."""
         return write_boards(run, path)
 
-    def design_of_run(self, run: Run, asked: Mapping[str, Any]) -> Design:
+    def design_of_run(self, run: SearchResult, asked: Mapping[str, Any]) -> Design:
         """The best table of a run."""
         from legible_envs.workspace import make_workspace
 
         refuse(asked, "pots", "table")
         refuse(asked, "task", "run, which has its own task")
         workspace: Any = make_workspace({**run.config["workspace"], **asked}) if asked else run.workspace
-        layout = run.workspace.decode(run.best_genome)
-        return TableDesign(layout, workspace, run.best_genome, "", dict(asked), workspace.task, run)
+        genome = run.require_genome()
+        return TableDesign(run.best_layout, workspace, genome, "", dict(asked), workspace.task, run)
 
     # -- the page of a report --------------------------------------------------------------------------------------
 
@@ -365,7 +366,7 @@ class TablePresenter(Presenter):
         name = task if isinstance(task, str) else task["name"]
         return f"A search for {WANTED.get(data['objective']['name'], 'good')} tables: {name}"
 
-    def conditions(self, run: Run) -> Sequence[Condition]:
+    def conditions(self, run: SearchResult) -> Sequence[Condition]:
         """The baseline and what every condition found."""
         return boards_of(run)
 

@@ -6,10 +6,11 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from benchmarks.runs import Run, RunError, read_run
+from optimizers.errors import SearchError
 
 if TYPE_CHECKING:
     from benchmarks.presenters.base import Condition
+    from optimizers import SearchResult
 
 __all__ = ["CONDITIONS", "LIST", "beta_of", "boards_of", "listed", "write_boards"]
 
@@ -23,26 +24,30 @@ LIST: Final = "conditions.json"
 """File in a run's folder that says which conditions were searched together."""
 
 
-def boards_of(run: Run) -> list[Condition]:
+def boards_of(run: SearchResult) -> list[Condition]:
     """The sorted baseline and the best layout of every condition searched in a run's folder.
 
     A condition whose search has not found anything yet is left out.
     """
     from benchmarks.presenters.base import Condition
+    from optimizers import load_run
 
     runs = {run.config["workspace"]["condition"]: run}
-    for name, folder in listed(run.folder).items():
+    root = _folder_of(run)
+    for name, folder in listed(root).items():
         if folder != ".":
             try:
-                runs[name] = read_run(run.folder / folder)
-                _ = runs[name].best_genome
-            except RunError:
-                runs.pop(name, None)
-    baseline, scorer = run.workspace.baseline, run.workspace.scorer
+                found_there = load_run(root / folder)
+            except SearchError:
+                continue
+            if found_there.best_genome is not None:
+                runs[name] = found_there
+    workspace: Any = run.workspace
+    baseline, scorer = workspace.baseline, workspace.scorer
     found = [("Baseline", baseline, "objects sorted by colour and shape")]
     for name, title in CONDITIONS.items():
         if name in runs:
-            layout = runs[name].workspace.decode(runs[name].best_genome)
+            layout = runs[name].workspace.decode(runs[name].require_genome())
             count = len(layout.obstacles)
             note = f"the best layout found, with {count} virtual obstacle{'' if count == 1 else 's'}"
             found.append((title, layout, "the best layout found" if name == "placement" else note))
@@ -64,14 +69,21 @@ def boards_of(run: Run) -> list[Condition]:
     return conditions
 
 
-def write_boards(run: Run, path: Path | None = None) -> Path:
+def write_boards(run: SearchResult, path: Path | None = None) -> Path:
     """Write the figure of a run's boards and the desired configuration; ``boards.png`` in its folder if no path."""
     from legible_envs.tabletop.rendering import draw_panels, save_png
 
-    workspace = run.workspace
+    workspace: Any = run.workspace
     boards = {condition.name: condition.layout for condition in boards_of(run)}
     picture = draw_panels(boards, workspace.task, scorer=workspace.scorer, beta=beta_of(workspace))
-    return save_png(path or run.folder / "boards.png", picture)
+    return save_png(path or _folder_of(run) / "boards.png", picture)
+
+
+def _folder_of(run: SearchResult) -> Path:
+    """Where a search that was read back lies."""
+    if run.folder is None:
+        raise SearchError("a search without a folder has no conditions beside it: give search() a checkpoint folder")
+    return run.folder
 
 
 def listed(folder: Path) -> dict[str, str]:
@@ -81,9 +93,9 @@ def listed(folder: Path) -> dict[str, str]:
     except FileNotFoundError:
         return {}
     except ValueError as error:
-        raise RunError(f"{folder / LIST} is not valid JSON: {error}") from error
+        raise SearchError(f"{folder / LIST} is not valid JSON: {error}") from error
     if not isinstance(data, dict) or not set(data) <= set(CONDITIONS):
-        raise RunError(f"{folder / LIST} must map conditions {list(CONDITIONS)} to folders")
+        raise SearchError(f"{folder / LIST} must map conditions {list(CONDITIONS)} to folders")
     return {str(key): str(value) for key, value in data.items()}
 
 

@@ -218,7 +218,7 @@ def save_evaluation(results: PredictionResults, layout: str, out: Path | None) -
         out: The folder to write into; None takes the run's, and writes nothing without a run.
     """
     from benchmarks.reports.search_report import write_report
-    from benchmarks.runs import is_run_folder
+    from optimizers import is_run_folder
 
     is_run = layout != "-" and is_run_folder(layout)
     if out is None and not is_run:

@@ -18,8 +18,8 @@ import numpy as np
 
 from benchmarks.presenters.base import Condition, Presenter, loss_row, presenter_of
 from benchmarks.reports.prediction_report import FOLDER, evaluation_section
-from benchmarks.runs import Run, read_run
 from legible_envs.support.files import write_atomically
+from optimizers import Elites, SearchResult, load_run
 
 __all__ = ["report_data", "write_best_image", "write_report"]
 
@@ -56,13 +56,13 @@ def write_report(
         The path of the page.
 
     Raises:
-        RunError: A file of the run is missing or damaged.
+        SearchError: A file of the run is missing or damaged, or no layout has scored yet.
     """
-    run = read_run(run_folder)
-    path = run.folder / "report.html"
+    folder, run = Path(run_folder), load_run(run_folder)
+    path = folder / "report.html"
     presenter = _presenter(run)
     data = report_data(run, conditions, recorded_play)
-    page = _render(data, presenter, _reaches(run), evaluation_section(run.folder / FOLDER) or "")
+    page = _render(data, presenter, _reaches(run), evaluation_section(folder / FOLDER) or "")
     write_atomically(path, lambda stream: stream.write(page.encode()))
     return path
 
@@ -71,23 +71,23 @@ def write_best_image(run_folder: str | Path, **options: Any) -> Path:
     """Write ``best.png``, a drawing of the run's best layout, into its folder; ``options`` are those of the drawing."""
     from legible_envs.drawing import save_png
 
-    run = read_run(run_folder)
-    path = run.folder / "best.png"
-    save_png(path, _presenter(run).draw(run.workspace.decode(run.best_genome), run.workspace, **options))
+    run = load_run(run_folder)
+    path = Path(run_folder) / "best.png"
+    save_png(path, _presenter(run).draw(run.workspace.decode(run.require_genome()), run.workspace, **options))
     return path
 
 
-def _presenter(run: Run) -> Presenter:
+def _presenter(run: SearchResult) -> Presenter:
     return presenter_of(str(run.config["workspace"].get("workspace")))
 
 
 def report_data(
-    run: Run,
+    run: SearchResult,
     conditions: Sequence[Condition] | None = None,
     recorded_play: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Everything the page shows, as JSON-ready data; this is also what its download button saves."""
-    config, presenter = run.config, _presenter(run)
+    config, presenter, elites = run.config, _presenter(run), run.elites()
     rows, columns = (int(n) for n in config["archive"]["dims"])
     found = presenter.conditions(run) if conditions is None else conditions
     return {
@@ -97,9 +97,9 @@ def report_data(
         "words": presenter.words,
         "objective": dict(config["objective"]),
         "best": _best(run, presenter),
-        "axes": _axes(run, rows, columns),
-        "cells": _cells(run, presenter, rows, columns),
-        "archive_size": len(run.solution),
+        "axes": _axes(run, elites, rows, columns),
+        "cells": _cells(run, elites, presenter, rows, columns),
+        "archive_size": len(elites),
         "archive_dims": [rows, columns],
         "history": _history(run),
         "conditions": [_condition(c, presenter, run.workspace) for c in found],
@@ -115,13 +115,13 @@ _NO_PLAY: dict[str, Any] = {"note": "", "fractions": [], "curves": [], "table": 
 # -- the parts of the data ---------------------------------------------------------------------------------------------
 
 
-def _best(run: Run, presenter: Presenter) -> dict[str, Any]:
-    genome = run.best_genome
+def _best(run: SearchResult, presenter: Presenter) -> dict[str, Any]:
+    genome = run.require_genome()
     summary = {key: _plain(value) for key, value in run.workspace.summary(genome).items()}
     return {**summary, "layout": presenter.encode(run.workspace.decode(genome))}
 
 
-def _axes(run: Run, rows: int, columns: int) -> list[dict[str, Any]]:
+def _axes(run: SearchResult, elites: Elites, rows: int, columns: int) -> list[dict[str, Any]]:
     """Names and labels of both axes; ``step`` is how many archive cells share one drawn cell.
 
     Rows beyond the first and the last one with a layout in it are left out: rooms allow far fewer obstacles than they
@@ -129,7 +129,7 @@ def _axes(run: Run, rows: int, columns: int) -> list[dict[str, Any]]:
     """
     archive = run.config["archive"]
     names = archive.get("measure_names") or ["first measure", "second measure"]
-    filled = min(rows, int(run.index.max()) // columns + 2) if len(run.index) else rows
+    filled = min(rows, int(elites.index.max()) // columns + 2) if len(elites) else rows
     order_names = list(getattr(run.workspace, "order_names", ()))
     axes = []
     for i, (name, count, whole, most, labels) in enumerate(
@@ -155,22 +155,22 @@ def _cell_labels(low: float, high: float, count: int) -> list[str]:
     return [f"{low + n * width:.{digits}f}" for n in range(count)]
 
 
-def _cells(run: Run, presenter: Presenter, rows: int, columns: int) -> list[list[Any]]:
+def _cells(run: SearchResult, elites: Elites, presenter: Presenter, rows: int, columns: int) -> list[list[Any]]:
     """The archive as ``[row, column, objective, legibility, distance, layout or None]``, best first."""
     steps = (math.ceil(rows / MAX_ROWS), math.ceil(columns / MAX_COLUMNS))
     drawn: dict[tuple[int, int], int] = {}
-    for i, index in enumerate(run.index):
+    for i, index in enumerate(elites.index):
         row, column = divmod(int(index), columns)
         drawn.setdefault((row // steps[0], column // steps[1]), i)
     if not drawn:
         return []
-    genomes = run.solution[list(drawn.values())]
+    genomes = elites.solution[list(drawn.values())]
     legibility, distance = run.workspace.legibility(genomes), run.workspace.distance(genomes)
     carried = min(MAX_LAYOUTS, presenter.carried(run.workspace, LAYOUT_BYTES))
     return [
         [
             *cell,
-            _plain(run.objective[i]),
+            _plain(elites.objective[i]),
             _plain(legibility[n]),
             _plain(distance[n]),
             presenter.encode(run.workspace.decode(genomes[n])) if n < carried else None,
@@ -179,13 +179,13 @@ def _cells(run: Run, presenter: Presenter, rows: int, columns: int) -> list[list
     ]
 
 
-def _history(run: Run) -> dict[str, list[float | None]]:
+def _history(run: SearchResult) -> dict[str, list[float | None]]:
     names = ("evaluations", "best", "qd_score", "coverage")
-    length = min((len(run.history[name]) for name in names if name in run.history), default=0)
-    if length == 0 or any(name not in run.history for name in names):
+    table = run.metrics()
+    if table.empty:
         return {}
-    picked = np.unique(np.linspace(0, length - 1, min(length, MAX_POINTS)).round().astype(int))
-    return {name: [_plain(v) for v in run.history[name][picked]] for name in names}
+    picked = np.unique(np.linspace(0, len(table) - 1, min(len(table), MAX_POINTS)).round().astype(int))
+    return {name: [_plain(v) for v in table[name].to_numpy(np.float64)[picked]] for name in names}
 
 
 def _condition(condition: Condition, presenter: Presenter, workspace: Any) -> dict[str, Any]:
@@ -201,9 +201,9 @@ def _condition(condition: Condition, presenter: Presenter, workspace: Any) -> di
     }
 
 
-def _reaches(run: Run) -> list[dict[str, Any]]:
+def _reaches(run: SearchResult) -> list[dict[str, Any]]:
     """Where the best layout loses and wins most, in words."""
-    rows = run.workspace.explain(run.best_genome)
+    rows = run.workspace.explain(run.require_genome())
     worst, best = rows[:WORST_ROWS], rows[WORST_ROWS:][-BEST_ROWS:]
     return [{str(key): value for key, value in loss_row(row).items()} for row in (*worst, *best)]
 

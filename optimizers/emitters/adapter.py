@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
-from ribs.emitters import EmitterBase
 
+from legible_envs.workspace import Workspace
+from optimizers.emitters.base import AddInfo, Seed, WorkspaceEmitter
 from optimizers.errors import EmitterError
 
 if TYPE_CHECKING:
@@ -72,7 +73,7 @@ class FloatArchiveView:
         return {name: np.asarray(v, dtype=np.float64) if name == "solution" else v for name, v in data.items()}
 
 
-class GenomeAdapter(EmitterBase):
+class GenomeAdapter(WorkspaceEmitter):
     """Turns what an emitter proposes into valid genomes, and results back into what the emitter expects.
 
     ``ask`` rounds to whole numbers (only where genomes are integer), clips to the workspace's bounds, and leaves out
@@ -88,34 +89,28 @@ class GenomeAdapter(EmitterBase):
         name: What to call it in errors.
         seed: Seed of the random layouts.
         initial: Random layouts proposed while the archive is empty.
-    """
 
-    emits_valid = True
+    Attributes:
+        emitter: The emitter that is adapted.
+        raw: ``(n, d)`` what it proposed last, before rounding, clipping and filtering; None for random layouts.
+    """
 
     def __init__(
         self,
         archive: ArchiveBase,
-        workspace: Any,
+        workspace: Workspace,
         emitter: Any,
         *,
         name: str = "emitter",
-        seed: int | np.random.SeedSequence | None = None,
+        seed: Seed = None,
         initial: int = 1000,
     ) -> None:
-        super().__init__(
-            archive,
-            solution_dim=archive.solution_dim,
-            bounds=None,
-            lower_bounds=workspace.lower_bounds,
-            upper_bounds=workspace.upper_bounds,
-        )
+        super().__init__(archive, workspace, seed=seed)
         self.emitter = emitter
-        self._workspace = workspace
         self._name = name
         self._initial = initial
-        self._rng = np.random.default_rng(seed)
         self._worst = np.inf
-        self._raw: npt.NDArray[Any] | None = None
+        self.raw: npt.NDArray[Any] | None = None
         self._kept = np.zeros(0, dtype=bool)
 
     def __getattr__(self, name: str) -> Any:
@@ -131,7 +126,7 @@ class GenomeAdapter(EmitterBase):
             EmitterError: The emitter proposed an array of a wrong shape, or nothing valid in 100 batches.
         """
         if self.archive.empty:
-            self._raw = None
+            self.raw = None
             return self._workspace.sample(self._initial, self._rng)
         for _ in range(_PATIENCE):
             raw = np.asarray(self.emitter.ask())
@@ -141,7 +136,7 @@ class GenomeAdapter(EmitterBase):
                     f"it returned {raw.dtype} of shape {raw.shape}"
                 )
             genomes = self.to_genomes(raw)
-            self._raw, self._kept = raw, np.asarray(self._workspace.valid(genomes), dtype=bool)
+            self.raw, self._kept = raw, np.asarray(self._workspace.valid(genomes), dtype=bool)
             if self._kept.any() or not len(raw):
                 return genomes[self._kept]
             self.tell(genomes[:0], np.zeros(0), np.zeros((0, len(self.archive.lower_bounds))), {})
@@ -161,11 +156,11 @@ class GenomeAdapter(EmitterBase):
         solution: npt.ArrayLike,
         objective: npt.ArrayLike,
         measures: npt.ArrayLike,
-        add_info: dict[str, npt.NDArray[Any]],
+        add_info: AddInfo,
         **fields: npt.ArrayLike,
     ) -> None:
         """Hand the results back to the emitter, in its own order and numbers."""
-        if self._raw is None:
+        if self.raw is None:
             return
         scores = np.asarray(objective, dtype=np.float64)
         scored = ~np.isnan(scores)
@@ -174,19 +169,19 @@ class GenomeAdapter(EmitterBase):
         worst = self._worst if np.isfinite(self._worst) else float(self.archive.qd_score_offset)
         best = float(self.archive.stats.obj_max) if self.archive.stats.obj_max is not None else worst
         rows = np.flatnonzero(self._kept)[scored]
-        n = len(self._raw)
+        n = len(self.raw)
         whole_scores = np.full(n, worst)
         whole_scores[rows] = scores[scored]
         whole_measures = np.tile(np.asarray(self.archive.lower_bounds, dtype=np.float64), (n, 1))
         whole_measures[rows] = np.asarray(measures, dtype=np.float64)[scored]
-        info: dict[str, npt.NDArray[Any]] = {"status": np.zeros(n, dtype=np.int32), "value": np.full(n, worst - best)}
+        info: AddInfo = {"status": np.zeros(n, dtype=np.int32), "value": np.full(n, worst - best)}
         for name in ("status", "value"):
             if name in add_info:
                 info[name][rows] = np.asarray(add_info[name])[scored]
-        self.emitter.tell(self._raw, whole_scores, whole_measures, info)
+        self.emitter.tell(self.raw, whole_scores, whole_measures, info)
 
 
-class FunctionEmitter(EmitterBase):
+class FunctionEmitter(WorkspaceEmitter):
     """A plain function as an emitter.
 
     Args:
@@ -197,26 +192,20 @@ class FunctionEmitter(EmitterBase):
         seed: Seed of ``rng``.
     """
 
+    emits_valid = False
+
     def __init__(
         self,
         archive: ArchiveBase,
-        workspace: Any,
+        workspace: Workspace,
         *,
         propose: Callable[..., npt.NDArray[Any]],
         options: Mapping[str, Any] | None = None,
-        seed: int | np.random.SeedSequence | None = None,
+        seed: Seed = None,
     ) -> None:
-        super().__init__(
-            archive,
-            solution_dim=archive.solution_dim,
-            bounds=None,
-            lower_bounds=workspace.lower_bounds,
-            upper_bounds=workspace.upper_bounds,
-        )
-        self._workspace = workspace
+        super().__init__(archive, workspace, seed=seed)
         self._propose = propose
         self._options = dict(options or {})
-        self._rng = np.random.default_rng(seed)
 
     def ask(self) -> npt.NDArray[Any]:
         """Call the function."""

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from ribs.emitters import EmitterBase
 
-from optimizers.emitters.mutation import draw_elites, perturbed
+from legible_envs.workspace import Workspace
+from optimizers.emitters.base import AddInfo, Seed, WorkspaceEmitter, check_at_least, read_only
+from optimizers.emitters.draws import draw_elites, perturbed
 
 if TYPE_CHECKING:
     from ribs.archives import ArchiveBase
 
-__all__ = ["AnnealingEmitter"]
+__all__ = ["AnnealingEmitter", "Chains"]
 
 _CALIBRATION = 1000
 _PER_GENE_PAIR = 16
@@ -23,19 +24,33 @@ _GROUPS = 8
 Array = npt.NDArray[np.float64]
 
 
-class AnnealingEmitter(EmitterBase):
-    """Population annealing from random elites: walks that cool together and are replaced by better ones, in cycles.
+class Chains(NamedTuple):
+    """Where annealed chains stand, group by group.
+
+    Attributes:
+        genomes: ``(groups, chains, d)`` the layout each has reached.
+        scores: ``(groups, chains)`` its score.
+        temperature: The temperature at which each accepts or rejects its next step, in the unit of the objective.
+    """
+
+    genomes: npt.NDArray[Any]
+    scores: Array
+    temperature: float
+
+
+class AnnealingEmitter(WorkspaceEmitter):
+    """Population annealing from random elites: chains that cool together and are replaced by better ones, in cycles.
 
     A climb that only ever accepts better layouts ends where every single change is for the worse, and most changes to a
-    good kitchen are: a wall has to open before it can close elsewhere. An annealed walk (Kirkpatrick et al., 1983)
+    good kitchen are: a wall has to open before it can close elsewhere. An annealed chain (Kirkpatrick et al., 1983)
     makes one random change at a time and accepts a loss ``d`` with probability ``exp(-d / temperature)``; as it cools
     it settles in ever deeper valleys. One evaluation buys one step, where a climb pays for a whole fan of perturbations
-    to take one. All layouts met on the way are offered to the archive, so that hot walks explore it and cold ones
-    refine it. ``resamplings`` times a cycle, walks are drawn anew among themselves in proportion to how much the lower
+    to take one. All layouts met on the way are offered to the archive, so that hot chains explore it and cold ones
+    refine it. ``resamplings`` times a cycle, chains are drawn anew among themselves in proportion to how much the lower
     temperature favours where they stand (Hukushima & Iba, 2003; here by systematic resampling): those in hopeless
     valleys give their evaluations to those in promising ones.
 
-    ``chains`` walks start from random elites, every archive cell equally likely, and cool together over ``cycle``
+    ``chains`` of them start from random elites, every archive cell equally likely, and cool together over ``cycle``
     evaluations; then others start. Several such groups run side by side and know nothing of one another: each may end
     in another valley, and batches are larger. The temperature falls linearly from ``heat`` to ``heat * cold`` times the
     typical change of score: the median absolute difference between a layout and its perturbation, taken over the first
@@ -43,19 +58,19 @@ class AnnealingEmitter(EmitterBase):
 
     Measured with ``prefix="sum"``, mean best score (standard deviation) against that of ``"improve"``, over the same
     seeds: at 200,000 evaluations 176.6 (5.4) against 163.0 (3.9) on 9x9 (ten seeds, p = 2e-4) and 55.2 (2.5) against
-    53.2 (4.0) on 5x9 (sixty seeds, p = 3e-3); at a million 183.5 (4.7) against 169.8 (4.9) on 9x9. Drawing walks anew
-    matters on 9x9: one cycle of 50,000 evaluations ends at 173.5 (5.8), without it at 163.1 (7.7). Walks refine more
-    than they spread: who wants the archive filled gets a higher QD score from ``"mutation"`` or ``"nslc"``.
+    53.2 (4.0) on 5x9 (sixty seeds, p = 3e-3); at a million 183.5 (4.7) against 169.8 (4.9) on 9x9. Drawing chains anew
+    matters on 9x9: one cycle of 50,000 evaluations ends at 173.5 (5.8), without it at 163.1 (7.7). Chains refine
+    more than they spread: ``"mutation"`` and ``"nslc"`` fill the archive further, to a higher QD score.
 
     Args:
         archive: Archive of the search.
         workspace: The design problem; must offer ``sample``, ``perturb`` and ``phases``. Where it has several phases,
             each step is made in one drawn at random.
-        chains: Walks of a group. Default one for each 600 evaluations of a cycle, 4 to 16.
+        chains: Chains of a group. Default one for each 600 evaluations of a cycle, 4 to 16.
         cycle: Evaluations of a group from hot to cold. Default 16 for each pair of genes (50,000 in a 9x9 kitchen), or
             what makes whole cycles of at least that within ``evaluations`` (a smaller budget is one cycle).
         groups: Groups side by side. Default as many as there are cycles within ``evaluations``, at most 8.
-        resamplings: How often in a cycle walks are drawn anew; 0 leaves plain simulated annealing.
+        resamplings: How often in a cycle chains are drawn anew; 0 leaves plain simulated annealing.
         heat: First temperature, in typical changes of score.
         cold: Last temperature, as a share of the first.
         evaluations: Planned number of evaluations, used only for the defaults of ``cycle`` and ``groups``.
@@ -64,18 +79,16 @@ class AnnealingEmitter(EmitterBase):
         seed: Seed of this emitter's draws.
 
     Attributes:
-        chains: Walks of a group.
+        chains: Chains of a group.
         cycle: Evaluations of a group from hot to cold.
         groups: Groups side by side.
         cycles: Cycles begun so far, those side by side as one.
     """
 
-    emits_valid = True
-
     def __init__(
         self,
         archive: ArchiveBase,
-        workspace: Any,
+        workspace: Workspace,
         *,
         chains: int | None = None,
         cycle: int | None = None,
@@ -85,24 +98,15 @@ class AnnealingEmitter(EmitterBase):
         cold: float = 0.03,
         evaluations: int | None = None,
         initial: int = 1000,
-        seed: int | np.random.SeedSequence | None = None,
+        seed: Seed = None,
     ) -> None:
-        for name, value in (("chains", chains), ("cycle", cycle), ("groups", groups), ("initial", initial)):
-            if value is not None and value < 1:
-                raise ValueError(f"{name} must be at least 1, got {value}")
-        if resamplings < 0:
-            raise ValueError(f"resamplings must not be negative, got {resamplings}")
+        check_at_least(1, chains=chains, cycle=cycle, groups=groups, initial=initial)
+        check_at_least(0, resamplings=resamplings)
         if not heat > 0:
             raise ValueError(f"heat must be positive, got {heat}")
         if not 0 < cold <= 1:
             raise ValueError(f"cold must be above 0 and at most 1, got {cold}")
-        super().__init__(
-            archive,
-            solution_dim=archive.solution_dim,
-            bounds=None,
-            lower_bounds=workspace.lower_bounds,
-            upper_bounds=workspace.upper_bounds,
-        )
+        super().__init__(archive, workspace, seed=seed)
         size = int(archive.solution_dim)
         planned_cycle, planned_groups = _plan(evaluations, int(initial), size)
         self.cycle = planned_cycle if cycle is None else int(cycle)
@@ -110,11 +114,9 @@ class AnnealingEmitter(EmitterBase):
         self.chains = max(4, min(_CHAINS, self.cycle // _STEPS)) if chains is None else int(chains)
         self.cycles = 0
         self._heat, self._cold, self._resamplings = float(heat), float(cold), int(resamplings)
-        self._workspace = workspace
         self._initial = int(initial)
-        self._rng = np.random.default_rng(seed)
-        # One row per walk, group by group: where it stands and what that scores.
-        self._genomes = np.zeros((self.groups * self.chains, size), dtype=archive.dtypes["solution"])
+        # One row per chain, group by group: where it stands and what that scores.
+        self._genomes = self._blank_genomes(self.groups * self.chains)
         self._scores: Array = np.zeros(self.groups * self.chains)
         self._steps = max(1, self.cycle // self.chains)
         self._step = 0
@@ -135,6 +137,14 @@ class AnnealingEmitter(EmitterBase):
         }
 
     @property
+    def state(self) -> Chains:
+        """Where every chain stands now; a copy."""
+        shape = self.groups, self.chains
+        return Chains(
+            read_only(self._genomes.reshape(*shape, -1)), read_only(self._scores.reshape(shape)), self.temperature
+        )
+
+    @property
     def temperature(self) -> float:
         """The temperature now, in the unit of the objective; infinite before any change of score was seen."""
         return self._temperature(self._step)
@@ -146,7 +156,7 @@ class AnnealingEmitter(EmitterBase):
         return self._heat * float(np.median(self._changes)) * (1.0 - share * (1.0 - self._cold))
 
     def ask(self) -> npt.NDArray[Any]:
-        """Propose the next step of every walk: ``(groups * chains, d)`` valid genomes."""
+        """Propose the next step of every chain: ``(groups * chains, d)`` valid genomes."""
         self._asked = not self.archive.empty
         if not self._asked:
             return self._workspace.sample(self._initial, self._rng)
@@ -162,18 +172,10 @@ class AnnealingEmitter(EmitterBase):
         solution: npt.ArrayLike,
         objective: npt.ArrayLike,
         measures: npt.ArrayLike,
-        add_info: dict[str, npt.NDArray[Any]],
+        add_info: AddInfo,
         **fields: npt.ArrayLike,
     ) -> None:
-        """Let every walk accept its step or stay.
-
-        Args:
-            solution: ``(groups * chains, d)`` what ``ask`` proposed.
-            objective: ``(groups * chains,)`` scores, NaN where a layout is not allowed; no walk goes there.
-            measures: Not used.
-            add_info: Not used.
-            **fields: Not used.
-        """
+        """Let every chain accept its step or stay; no chain goes where the score is NaN."""
         if not self._asked:
             return
         scores = np.asarray(objective, dtype=np.float64)
@@ -187,7 +189,7 @@ class AnnealingEmitter(EmitterBase):
         self._step = (self._step + 1) % self._steps
 
     def _resample(self) -> None:
-        """Draw the walks of each group anew, each in proportion to how its odds changed with the temperature."""
+        """Draw the chains of each group anew, each in proportion to how its odds changed with the temperature."""
         before, now = self._temperature(self._step - self._every), self.temperature
         scores = self._scores.reshape(self.groups, self.chains)
         weights = np.exp((scores - scores.max(axis=1, keepdims=True)) * (1.0 / now - 1.0 / before))

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from legible_envs.workspace import Workspace
 from optimizers.emitters.registry import EmitterSpec, emitter_name, make_emitter, resolve_emitter
 from optimizers.errors import EmitterError
 
@@ -19,7 +20,7 @@ _INITIAL = 64
 
 
 def check_emitter(
-    emitter: EmitterSpec, workspace: Any = None, *, options: Mapping[str, Any] | None = None, seed: int = 0
+    emitter: EmitterSpec, workspace: Workspace | None = None, *, options: Mapping[str, Any] | None = None, seed: int = 0
 ) -> None:
     """Run an emitter for a few batches and check everything a search relies on.
 
@@ -57,7 +58,7 @@ def check_emitter(
 class _Trial:
     """A short search with one emitter, watched closely; what it proposed, and what was wrong."""
 
-    def __init__(self, spec: EmitterSpec, workspace: Any, options: Mapping[str, Any] | None, seed: int) -> None:
+    def __init__(self, spec: EmitterSpec, workspace: Workspace, options: Mapping[str, Any] | None, seed: int) -> None:
         from optimizers.archives import make_archive
         from optimizers.emitters.adapter import GenomeAdapter
 
@@ -115,7 +116,7 @@ class _Trial:
     def _proposal_fits(self, genomes: npt.NDArray[Any]) -> bool:
         """Check shape, type, bounds and validity of a batch."""
         size, dtype = self.workspace.genome_size, np.dtype(self.workspace.genome_dtype)
-        raw = self.emitter._raw if self._adapted and self.emitter._raw is not None else genomes
+        raw = self.emitter.raw if self._adapted and self.emitter.raw is not None else genomes
         found = len(self.problems)
         if genomes.ndim != 2 or genomes.shape[1] != size:
             self.problems.append(f"ask() must return shape (n, {size}), it returned {genomes.shape}")

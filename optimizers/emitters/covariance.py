@@ -2,32 +2,87 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from ribs.archives import GridArchive
 from ribs.emitters import EvolutionStrategyEmitter
 
+from legible_envs.random_keys import KeyDecoder
+from legible_envs.workspace import Workspace
 from optimizers.emitters.adapter import FloatArchiveView, GenomeAdapter
-from optimizers.emitters.mutation import draw_elites
-from optimizers.emitters.random_keys import Keys, random_keys
+from optimizers.emitters.base import Seed, check_at_least, read_only, seed_sequence
+from optimizers.emitters.draws import draw_elites
 
 if TYPE_CHECKING:
     from ribs.archives import ArchiveBase
 
-__all__ = ["CmaMaeEmitter", "CmaMeEmitter"]
+__all__ = ["CmaMaeEmitter", "CmaMeEmitter", "Strategies"]
 
 _ROUNDS = 100
 _MOST = 15
 
 
-class CmaMeEmitter(GenomeAdapter):
+class Strategies(NamedTuple):
+    """How far evolution strategies are, one row per strategy; no rows before the first proposal.
+
+    Attributes:
+        starts: ``(strategies, d)`` the elite each began from last.
+        restarts: ``(strategies,)`` how often each has begun anew.
+        thresholds: ``(cells,)`` CMA-MAE's threshold of every archive cell met so far; empty for CMA-ME.
+        bests: ``(cells,)`` the best score met in that cell.
+    """
+
+    starts: npt.NDArray[Any]
+    restarts: npt.NDArray[np.int64]
+    thresholds: npt.NDArray[np.float64]
+    bests: npt.NDArray[np.float64]
+
+
+class _KeyStrategies(GenomeAdapter):
+    """Several of pyribs' evolution strategies on the random keys of layouts; arguments as in CMA-ME and CMA-MAE."""
+
+    def __init__(
+        self,
+        archive: ArchiveBase,
+        workspace: Workspace,
+        *,
+        name: str,
+        learning_rate: float | None,
+        strategies: int | None,
+        batch_size: int,
+        sigma0: float,
+        evaluations: int | None,
+        initial: int,
+        seed: Seed,
+    ) -> None:
+        check_at_least(1, strategies=strategies, batch_size=batch_size, initial=initial)
+        if not sigma0 > 0:
+            raise ValueError(f"sigma0 must be positive, got {sigma0}")
+        if strategies is None:
+            planned = _MOST if evaluations is None else evaluations // (_ROUNDS * batch_size)
+            strategies = max(1, min(_MOST, planned))
+        team_seed, own_seed = seed_sequence(seed).spawn(2)
+        team = _Team(archive, workspace, strategies, batch_size, float(sigma0), learning_rate, team_seed)
+        super().__init__(archive, workspace, team, name=name, seed=own_seed, initial=initial)
+
+    @property
+    def state(self) -> Strategies:
+        """Where every strategy began, and what it has to pass; a copy."""
+        return self.emitter.state
+
+    def to_genomes(self, raw: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """The layouts that ``(n, d)`` keys stand for."""
+        return self.emitter.decoder.decode(raw, self.emitter.anchors, self._rng)
+
+
+class CmaMeEmitter(_KeyStrategies):
     """CMA-ME: covariance matrix adaptation toward what is new to the archive or improves it, on random keys.
 
     Several of pyribs' ``EvolutionStrategyEmitter`` (ranked by two-stage improvement; Fontaine et al., 2020) side by
-    side, each from a random elite and, when a batch of it adds nothing, from another. They adapt real vectors, from
-    which layouts are read as random keys (:mod:`optimizers.emitters.random_keys`).
+    side, each from a random elite and, when a batch of it adds nothing, from another. They adapt real vectors, which
+    the workspace decodes as random keys (:meth:`~legible_envs.workspace.Workspace.key_decoder`).
 
     Args:
         archive: Archive of the search.
@@ -44,48 +99,30 @@ class CmaMeEmitter(GenomeAdapter):
     def __init__(
         self,
         archive: ArchiveBase,
-        workspace: Any,
+        workspace: Workspace,
         *,
         strategies: int | None = None,
         batch_size: int = 36,
         sigma0: float = 0.2,
         evaluations: int | None = None,
         initial: int = 1000,
-        seed: int | np.random.SeedSequence | None = None,
+        seed: Seed = None,
     ) -> None:
-        self._configure(archive, workspace, strategies, batch_size, sigma0, evaluations, initial, seed, None, "cma-me")
-
-    def _configure(
-        self,
-        archive: ArchiveBase,
-        workspace: Any,
-        strategies: int | None,
-        batch_size: int,
-        sigma0: float,
-        evaluations: int | None,
-        initial: int,
-        seed: int | np.random.SeedSequence | None,
-        learning_rate: float | None,
-        name: str,
-    ) -> None:
-        for what, value in (("strategies", strategies), ("batch_size", batch_size), ("initial", initial)):
-            if value is not None and value < 1:
-                raise ValueError(f"{what} must be at least 1, got {value}")
-        if not sigma0 > 0:
-            raise ValueError(f"sigma0 must be positive, got {sigma0}")
-        if strategies is None:
-            planned = _MOST if evaluations is None else evaluations // (_ROUNDS * batch_size)
-            strategies = max(1, min(_MOST, planned))
-        team_seed, own_seed = _sequence(seed).spawn(2)
-        team = _Team(archive, workspace, strategies, batch_size, float(sigma0), learning_rate, team_seed)
-        super().__init__(archive, workspace, team, name=name, seed=own_seed, initial=initial)
-
-    def to_genomes(self, raw: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        """The layouts that ``(n, d)`` keys stand for."""
-        return self.emitter.decoder.decode(raw, self.emitter.anchors, self._rng)
+        super().__init__(
+            archive,
+            workspace,
+            name="cma-me",
+            learning_rate=None,
+            strategies=strategies,
+            batch_size=batch_size,
+            sigma0=sigma0,
+            evaluations=evaluations,
+            initial=initial,
+            seed=seed,
+        )
 
 
-class CmaMaeEmitter(CmaMeEmitter):
+class CmaMaeEmitter(_KeyStrategies):
     """CMA-MAE: as CMA-ME, but toward what improves a threshold that each cell raises slowly, on random keys.
 
     A private archive keeps, for each cell, a threshold that moves by ``learning_rate`` of the way toward whatever
@@ -97,18 +134,19 @@ class CmaMaeEmitter(CmaMeEmitter):
         archive: Archive of the search; keeps the best of every cell as always.
         workspace: The design problem; must offer ``sample`` and ``valid``.
         learning_rate: How fast thresholds rise: 1 is CMA-ME's archive, 0 never.
-        strategies: As in CMA-ME.
-        batch_size: As in CMA-ME.
-        sigma0: As in CMA-ME.
-        evaluations: As in CMA-ME.
-        initial: As in CMA-ME.
+        strategies: How many evolution strategies; default as in CMA-ME: 15, but few enough for 100 batches each within
+            ``evaluations``.
+        batch_size: Layouts per strategy and batch.
+        sigma0: First step size; keys lie in [0, 1].
+        evaluations: Planned number of evaluations, used only for the default of ``strategies``.
+        initial: Random layouts proposed while the archive is empty.
         seed: Seed of this emitter's draws.
     """
 
     def __init__(
         self,
         archive: ArchiveBase,
-        workspace: Any,
+        workspace: Workspace,
         *,
         learning_rate: float = 0.01,
         strategies: int | None = None,
@@ -116,28 +154,28 @@ class CmaMaeEmitter(CmaMeEmitter):
         sigma0: float = 0.2,
         evaluations: int | None = None,
         initial: int = 1000,
-        seed: int | np.random.SeedSequence | None = None,
+        seed: Seed = None,
     ) -> None:
         if not 0 <= learning_rate <= 1:
             raise ValueError(f"learning_rate must be between 0 and 1, got {learning_rate}")
-        self._configure(
+        super().__init__(
             archive,
             workspace,
-            strategies,
-            batch_size,
-            sigma0,
-            evaluations,
-            initial,
-            seed,
-            float(learning_rate),
-            "cma-mae",
+            name="cma-mae",
+            learning_rate=float(learning_rate),
+            strategies=strategies,
+            batch_size=batch_size,
+            sigma0=sigma0,
+            evaluations=evaluations,
+            initial=initial,
+            seed=seed,
         )
 
 
 class _KeyArchiveView(FloatArchiveView):
     """An archive seen by an evolution strategy: elites as keys; remembers the elite it began from last."""
 
-    def __init__(self, archive: ArchiveBase, decoder: Keys, rng: np.random.Generator) -> None:
+    def __init__(self, archive: ArchiveBase, decoder: KeyDecoder, rng: np.random.Generator) -> None:
         super().__init__(archive)
         self._decoder = decoder
         self._rng = rng
@@ -156,14 +194,14 @@ class _Team:
     def __init__(
         self,
         archive: ArchiveBase,
-        workspace: Any,
+        workspace: Workspace,
         strategies: int,
         batch_size: int,
         sigma0: float,
         learning_rate: float | None,
         seed: np.random.SeedSequence,
     ) -> None:
-        self.decoder = random_keys(workspace)
+        self.decoder = workspace.key_decoder()
         self.settings: dict[str, float] = {"strategies": strategies, "batch_size": batch_size, "sigma0": sigma0}
         if learning_rate is not None:
             self.settings["learning_rate"] = learning_rate
@@ -171,6 +209,21 @@ class _Team:
         self._learning_rate = learning_rate
         self._members: list[EvolutionStrategyEmitter] = []
         self._soft: GridArchive | None = None
+
+    @property
+    def state(self) -> Strategies:
+        """See :class:`Strategies`."""
+        starts = [member.archive.start for member in self._members]
+        soft = {"threshold": np.zeros(0), "objective": np.zeros(0)}
+        if self._soft is not None:
+            soft = self._soft.data(list(soft))
+        arrays = (
+            np.array(starts) if starts else np.zeros((0, self._archive.solution_dim)),
+            np.array([member.restarts for member in self._members], dtype=np.int64),
+            soft["threshold"],
+            soft["objective"],
+        )
+        return Strategies(*map(read_only, arrays))
 
     @property
     def anchors(self) -> npt.NDArray[Any]:
@@ -224,7 +277,3 @@ class _Team:
                     **options,
                 )
             )
-
-
-def _sequence(seed: int | np.random.SeedSequence | None) -> np.random.SeedSequence:
-    return seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)

@@ -2,32 +2,46 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from ribs.emitters import EmitterBase
 
-from optimizers.emitters.mutation import draw_elites
-from optimizers.emitters.random_keys import random_keys
+from legible_envs.workspace import Workspace
+from optimizers.emitters.base import AddInfo, CountingEmitter, Seed, check_at_least, read_only
+from optimizers.emitters.draws import draw_elites
 
 if TYPE_CHECKING:
     from ribs.archives import ArchiveBase
 
-__all__ = ["STRATEGIES", "DifferentialEvolutionEmitter"]
+__all__ = ["STRATEGIES", "DifferentialEvolutionEmitter", "Population"]
 
 STRATEGIES = ("best1bin", "rand1bin", "currenttobest1bin")
 Array = npt.NDArray[np.float64]
 
 
-class DifferentialEvolutionEmitter(EmitterBase):
-    """Differential evolution of vectors in [0, 1], from which layouts are read as random keys.
+class Population(NamedTuple):
+    """The members of a population, one row each; row ``i`` of the next batch is the rival of member ``i``.
+
+    Attributes:
+        genomes: ``(population, d)`` their layouts.
+        keys: ``(population, m)`` the random keys of these.
+        scores: ``(population,)`` their scores; negative infinity where a layout was not scored yet.
+    """
+
+    genomes: npt.NDArray[Any]
+    keys: Array
+    scores: Array
+
+
+class DifferentialEvolutionEmitter(CountingEmitter):
+    """Differential evolution of vectors in [0, 1] that stand for layouts as random keys.
 
     Each generation offers a rival to every member of the population: a base vector plus a scaled difference of two
     others, mixed with the member gene by gene; the better of the two stays. Names, defaults and details are those of
     ``scipy.optimize.differential_evolution`` with ``updating="deferred"``: mutation dithers in [0.5, 1) once a
     generation, recombination is 0.7, at least one gene is the mutant's, genes out of bounds are drawn anew. There is no
-    polishing. How vectors become layouts: :mod:`optimizers.emitters.random_keys`.
+    polishing. How vectors become layouts, the workspace says (:meth:`~legible_envs.workspace.Workspace.key_decoder`).
 
     The population begins as elites of the archive (drawn without replacement), and random layouts where these are too
     few; the latter are scored only through their rivals, who replace them.
@@ -48,12 +62,10 @@ class DifferentialEvolutionEmitter(EmitterBase):
         finished: Generations so far.
     """
 
-    emits_valid = True
-
     def __init__(
         self,
         archive: ArchiveBase,
-        workspace: Any,
+        workspace: Workspace,
         *,
         population: int | None = None,
         strategy: str = "best1bin",
@@ -61,39 +73,28 @@ class DifferentialEvolutionEmitter(EmitterBase):
         recombination: float = 0.7,
         iterations: int | None = None,
         evaluations: int | None = None,
-        seed: int | np.random.SeedSequence | None = None,
+        seed: Seed = None,
     ) -> None:
-        if population is not None and population < 5:
-            raise ValueError(f"population must be at least 5, got {population}")
+        check_at_least(5, population=population)
         if strategy not in STRATEGIES:
             raise ValueError(f"strategy must be one of {', '.join(STRATEGIES)}, got {strategy!r}")
         if not 0 <= recombination <= 1:
             raise ValueError(f"recombination must be a probability, got {recombination}")
-        super().__init__(
-            archive,
-            solution_dim=archive.solution_dim,
-            bounds=None,
-            lower_bounds=workspace.lower_bounds,
-            upper_bounds=workspace.upper_bounds,
-        )
-        self._workspace = workspace
-        self._decoder = random_keys(workspace)
+        super().__init__(archive, workspace, iterations=iterations, seed=seed)
+        self._decoder = workspace.key_decoder()
         self.population = _default_population(self._decoder.size, evaluations) if population is None else population
         self._strategy, self._recombination = strategy, float(recombination)
         low, high = (mutation, mutation) if isinstance(mutation, int | float) else mutation
         self._mutation = float(low), float(high)
-        self._limit = iterations
-        self.finished = 0
-        self._rng = np.random.default_rng(seed)
         self._keys: Array = np.zeros((0, self._decoder.size))
-        self._genomes = np.zeros((0, int(archive.solution_dim)), dtype=archive.dtypes["solution"])
+        self._genomes = self._blank_genomes()
         self._scores: Array = np.zeros(0)
         self._trials: Array | None = None
 
     @property
-    def done(self) -> bool:
-        """Whether all ``iterations`` generations have been told."""
-        return self._limit is not None and self.finished >= self._limit
+    def state(self) -> Population:
+        """The members now; a copy. Empty before the first generation."""
+        return Population(read_only(self._genomes), read_only(self._keys), read_only(self._scores))
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -122,18 +123,10 @@ class DifferentialEvolutionEmitter(EmitterBase):
         solution: npt.ArrayLike,
         objective: npt.ArrayLike,
         measures: npt.ArrayLike,
-        add_info: dict[str, npt.NDArray[Any]],
+        add_info: AddInfo,
         **fields: npt.ArrayLike,
     ) -> None:
-        """Put every rival that is at least as good in the place of its member.
-
-        Args:
-            solution: ``(population, d)`` what ``ask`` proposed.
-            objective: ``(population,)`` scores, NaN where a layout is not allowed; such a rival loses.
-            measures: Not used.
-            add_info: Not used.
-            **fields: Not used.
-        """
+        """Put every rival that is at least as good in the place of its member; a rival without a score loses."""
         if self._trials is None:
             return
         scores = np.asarray(objective, dtype=np.float64)

@@ -2,18 +2,35 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
 import numpy as np
 import numpy.typing as npt
 from ribs.emitters import GradientArborescenceEmitter as RibsGradientArborescenceEmitter
 
+from legible_envs.workspace import Workspace
 from optimizers.emitters.adapter import FloatArchiveView, GenomeAdapter
+from optimizers.emitters.base import Seed, check_at_least, seed_sequence
 
 if TYPE_CHECKING:
     from ribs.archives import ArchiveBase
 
-__all__ = ["GradientArborescenceEmitter"]
+__all__ = ["DifferentiableWorkspace", "GradientArborescenceEmitter"]
+
+
+class DifferentiableWorkspace(Protocol):
+    """What a :class:`~legible_envs.workspace.Workspace` offers beyond its contract to be climbed by gradients."""
+
+    @property
+    def lower_bounds(self) -> npt.NDArray[Any]:
+        """``(d,)`` least value of each gene."""
+
+    @property
+    def upper_bounds(self) -> npt.NDArray[Any]:
+        """``(d,)`` greatest value of each gene."""
+
+    def gradients(self, genomes: npt.NDArray[Any], objective: str) -> npt.NDArray[np.float64]:
+        """``(n, 1 + measures, d)`` gradients of the objective, then of each measure, at ``(n, d)`` genomes."""
 
 
 class GradientArborescenceEmitter(GenomeAdapter):
@@ -25,7 +42,7 @@ class GradientArborescenceEmitter(GenomeAdapter):
 
     The workspace must offer ``gradients(genomes, objective) -> (n, 1 + measures, d)``, such as
     ``TabletopWorkspace(condition="placement", second_measure="mean x")``. Its gradients need not know of rules or of a
-    distance cap: what is not allowed is not taken, and the point does not follow it.
+    distance cap: the archive takes no layout that is not allowed, and the point does not follow it.
 
     Args:
         archive: Archive of the search; genomes must be real numbers.
@@ -45,14 +62,14 @@ class GradientArborescenceEmitter(GenomeAdapter):
     def __init__(
         self,
         archive: ArchiveBase,
-        workspace: Any,
+        workspace: Workspace,
         *,
         objective: str = "legibility",
         sigma0: float = 0.02,
         lr: float = 0.02,
         batch_size: int = 35,
         initial: int = 1000,
-        seed: int | np.random.SeedSequence | None = None,
+        seed: Seed = None,
     ) -> None:
         if not callable(getattr(workspace, "gradients", None)):
             raise ValueError(
@@ -66,13 +83,12 @@ class GradientArborescenceEmitter(GenomeAdapter):
         for name, value in (("sigma0", sigma0), ("lr", lr)):
             if not 0 < value < np.inf:
                 raise ValueError(f"{name} must be a positive number, got {value}")
-        for name, value in (("batch_size", batch_size), ("initial", initial)):
-            if value < 1:
-                raise ValueError(f"{name} must be at least 1, got {value}")
+        check_at_least(1, batch_size=batch_size, initial=initial)
         # Whether there are gradients, and of this objective, shows before anything is scored.
-        workspace.gradients(np.empty((0, archive.solution_dim)), objective)
-        own, seeds = (seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)).spawn(2)
-        tree = _Tree(archive, workspace, objective, float(sigma0), float(lr), int(batch_size), seeds)
+        differentiable = cast("DifferentiableWorkspace", workspace)
+        differentiable.gradients(np.empty((0, archive.solution_dim)), objective)
+        own, seeds = seed_sequence(seed).spawn(2)
+        tree = _Tree(archive, differentiable, objective, float(sigma0), float(lr), int(batch_size), seeds)
         super().__init__(archive, workspace, tree, name="gradient-arborescence", seed=own, initial=initial)
 
 
@@ -82,14 +98,14 @@ class _Tree:
     def __init__(
         self,
         archive: ArchiveBase,
-        workspace: Any,
+        workspace: DifferentiableWorkspace,
         objective: str,
         sigma0: float,
         lr: float,
         batch_size: int,
         seed: np.random.SeedSequence,
     ) -> None:
-        self.settings = {"objective": objective, "sigma0": sigma0, "lr": lr, "batch_size": batch_size}
+        self.settings: dict[str, Any] = {"objective": objective, "sigma0": sigma0, "lr": lr, "batch_size": batch_size}
         self._archive, self._workspace, self._seed = archive, workspace, seed
         self._emitter: RibsGradientArborescenceEmitter | None = None
 

@@ -2,24 +2,41 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from ribs.emitters import EmitterBase
 
-from optimizers.emitters.mutation import draw_elites
+from legible_envs.workspace import Workspace
+from optimizers.emitters.base import AddInfo, CountingEmitter, Seed, check_at_least, read_only
+from optimizers.emitters.draws import draw_elites
 
 if TYPE_CHECKING:
     from ribs.archives import ArchiveBase
 
-__all__ = ["ImproveWorkspaceEmitter"]
+__all__ = ["Climbs", "ImproveWorkspaceEmitter"]
 
 _BATCH = 2048
 _ROUNDS = 40
 
 
-class ImproveWorkspaceEmitter(EmitterBase):
+class Climbs(NamedTuple):
+    """Where climbs stand, one row per climb.
+
+    Attributes:
+        genomes: ``(climbs, d)`` the layout each has reached.
+        scores: ``(climbs,)`` its score.
+        phases: ``(climbs,)`` the phase of the workspace each is in; the number of phases once a climb has ended.
+        climbing: ``(climbs,)`` bool, whether each is under way; the others wait for an elite to begin from.
+    """
+
+    genomes: npt.NDArray[Any]
+    scores: npt.NDArray[np.float64]
+    phases: npt.NDArray[np.int64]
+    climbing: npt.NDArray[np.bool_]
+
+
+class ImproveWorkspaceEmitter(CountingEmitter):
     """Hill climbs from random elites, each step to the best of a set of perturbations (Tung et al., HRI 2024).
 
     Algorithm 2 of the paper draws a random elite and hands it to Algorithm 1: perturb the layout, offer every
@@ -48,51 +65,35 @@ class ImproveWorkspaceEmitter(EmitterBase):
         finished: Climbs that have ended so far.
     """
 
-    emits_valid = True
-
     def __init__(
         self,
         archive: ArchiveBase,
-        workspace: Any,
+        workspace: Workspace,
         *,
         climbs: int | None = None,
         fanout: int = 24,
         iterations: int | None = None,
         evaluations: int | None = None,
         initial: int = 1000,
-        seed: int | np.random.SeedSequence | None = None,
+        seed: Seed = None,
     ) -> None:
-        for name, value in (("climbs", climbs), ("fanout", fanout), ("initial", initial)):
-            if value is not None and value < 1:
-                raise ValueError(f"{name} must be at least 1, got {value}")
-        if iterations is not None and iterations < 0:
-            raise ValueError(f"iterations must not be negative, got {iterations}")
-        super().__init__(
-            archive,
-            solution_dim=archive.solution_dim,
-            bounds=None,
-            lower_bounds=workspace.lower_bounds,
-            upper_bounds=workspace.upper_bounds,
-        )
+        check_at_least(1, climbs=climbs, fanout=fanout, initial=initial)
+        super().__init__(archive, workspace, iterations=iterations, seed=seed)
         self.climbs = int(climbs) if climbs is not None else _default_climbs(fanout, evaluations, iterations)
         self.fanout = int(fanout)
         self.started = 0
-        self.finished = 0
-        self._workspace = workspace
-        self._limit = iterations
         self._initial = int(initial)
-        self._rng = np.random.default_rng(seed)
-        # One row per climb: where it stands, what that scores, the phase it is in, whether it is still climbing.
-        self._genomes = np.zeros((self.climbs, int(archive.solution_dim)), dtype=archive.dtypes["solution"])
+        # One row per climb, see Climbs.
+        self._genomes = self._blank_genomes(self.climbs)
         self._scores = np.zeros(self.climbs)
         self._phase = np.zeros(self.climbs, dtype=np.int64)
         self._climbing = np.zeros(self.climbs, dtype=bool)
         self._asked: npt.NDArray[np.int64] | None = None
 
     @property
-    def done(self) -> bool:
-        """Whether all ``iterations`` climbs have ended."""
-        return self._limit is not None and self.finished >= self._limit
+    def state(self) -> Climbs:
+        """Where every climb stands now; a copy."""
+        return Climbs(*map(read_only, (self._genomes, self._scores, self._phase, self._climbing)))
 
     @property
     def settings(self) -> dict[str, int]:
@@ -124,18 +125,10 @@ class ImproveWorkspaceEmitter(EmitterBase):
         solution: npt.ArrayLike,
         objective: npt.ArrayLike,
         measures: npt.ArrayLike,
-        add_info: dict[str, npt.NDArray[Any]],
+        add_info: AddInfo,
         **fields: npt.ArrayLike,
     ) -> None:
-        """Move every climb to its best strictly better perturbation, into its next phase, or to its end.
-
-        Args:
-            solution: ``(m * fanout, d)`` what ``ask`` proposed.
-            objective: ``(m * fanout,)`` scores, NaN where a layout is not allowed.
-            measures: Not used.
-            add_info: Not used.
-            **fields: Not used.
-        """
+        """Move every climb to its best strictly better perturbation, into its next phase, or to its end."""
         rows = self._asked
         if rows is None or not rows.size:
             return

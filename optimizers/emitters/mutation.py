@@ -1,23 +1,25 @@
-"""Plain MAP-Elites: random elites, each perturbed once; and the draws other emitters share with it."""
+"""Plain MAP-Elites: random elites, each perturbed once."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import numpy.typing as npt
-from ribs.emitters import EmitterBase
+
+from legible_envs.workspace import Workspace
+from optimizers.emitters.base import Seed, WorkspaceEmitter, check_at_least
+from optimizers.emitters.draws import draw_elites, perturbed
 
 if TYPE_CHECKING:
     from ribs.archives import ArchiveBase
 
-__all__ = ["MutationEmitter", "crossed", "draw_elites", "perturbed"]
+__all__ = ["MutationEmitter"]
 
 _BATCH = 1024
 _ROUNDS = 40
 
 
-class MutationEmitter(EmitterBase):
+class MutationEmitter(WorkspaceEmitter):
     """MAP-Elites as first described (Mouret & Clune, 2015): one random perturbation of each of some random elites.
 
     There is no climb: whether a child is any good shows only in whether the archive keeps it.
@@ -33,30 +35,19 @@ class MutationEmitter(EmitterBase):
         seed: Seed of this emitter's draws.
     """
 
-    emits_valid = True
-
     def __init__(
         self,
         archive: ArchiveBase,
-        workspace: Any,
+        workspace: Workspace,
         *,
         batch_size: int | None = None,
         evaluations: int | None = None,
-        seed: int | np.random.SeedSequence | None = None,
+        seed: Seed = None,
     ) -> None:
-        if batch_size is not None and batch_size < 1:
-            raise ValueError(f"batch_size must be at least 1, got {batch_size}")
-        super().__init__(
-            archive,
-            solution_dim=archive.solution_dim,
-            bounds=None,
-            lower_bounds=workspace.lower_bounds,
-            upper_bounds=workspace.upper_bounds,
-        )
+        check_at_least(1, batch_size=batch_size)
+        super().__init__(archive, workspace, seed=seed)
         planned = _BATCH if evaluations is None else min(_BATCH, max(1, evaluations // _ROUNDS))
         self._batch_size = planned if batch_size is None else int(batch_size)
-        self._workspace = workspace
-        self._rng = np.random.default_rng(seed)
 
     @property
     def settings(self) -> dict[str, int]:
@@ -69,52 +60,3 @@ class MutationEmitter(EmitterBase):
             return self._workspace.sample(self._batch_size, self._rng)
         parents, _ = draw_elites(self.archive, self._batch_size, self._rng)
         return perturbed(self._workspace, parents, self._rng)
-
-
-def draw_elites(
-    archive: ArchiveBase, n: int, rng: np.random.Generator, *, replace: bool = True
-) -> tuple[npt.NDArray[Any], npt.NDArray[np.float64]]:
-    """Draw elites uniformly over occupied cells.
-
-    They are numbered by cell index, not by arrival: the draw depends on what the archive holds alone.
-
-    Args:
-        archive: Not empty.
-        n: How many.
-        rng: Source of randomness.
-        replace: Whether an elite may be drawn again; if not, at most as many come back as there are.
-
-    Returns:
-        ``(n, d)`` genomes and ``(n,)`` scores.
-    """
-    elites = archive.data(["index", "solution", "objective"])
-    order = np.argsort(elites["index"])
-    if replace:
-        drawn = order[rng.integers(len(order), size=n)]
-    else:
-        drawn = rng.permutation(order)[:n]
-    return elites["solution"][drawn], elites["objective"][drawn]
-
-
-def perturbed(workspace: Any, genomes: npt.NDArray[Any], rng: np.random.Generator) -> npt.NDArray[Any]:
-    """``(n, d)`` one valid child of each of ``(n, d)`` valid genomes, each in a phase drawn at random."""
-    if not len(genomes):
-        return genomes
-    phases = int(workspace.phases)
-    if phases == 1:
-        return workspace.perturb(genomes, 1, rng)
-    drawn = rng.integers(phases, size=len(genomes))
-    children = np.empty_like(genomes)
-    for phase in range(phases):
-        members = drawn == phase
-        if members.any():
-            children[members] = workspace.perturb(genomes[members], 1, rng, phase=phase)
-    return children
-
-
-def crossed(
-    workspace: Any, mothers: npt.NDArray[Any], fathers: npt.NDArray[Any], rng: np.random.Generator
-) -> npt.NDArray[Any]:
-    """``(n, d)`` uniform crossover: each gene from either parent; the mother where that is no valid layout."""
-    children = np.where(rng.random(mothers.shape) < 0.5, mothers, fathers).astype(mothers.dtype)
-    return np.where(np.asarray(workspace.valid(children))[:, None], children, mothers)

@@ -3,25 +3,45 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from ribs.emitters import EmitterBase
 
-from optimizers.emitters.mutation import crossed, draw_elites, perturbed
+from legible_envs.workspace import Workspace
+from optimizers.emitters.base import AddInfo, Seed, WorkspaceEmitter, check_at_least, read_only
+from optimizers.emitters.draws import crossed, draw_elites, perturbed
 
 if TYPE_CHECKING:
     from ribs.archives import ArchiveBase
 
-__all__ = ["NoveltyLocalCompetitionEmitter", "crowding_distances", "novelty_and_competition", "pareto_ranks"]
+__all__ = ["Generation", "NoveltyLocalCompetitionEmitter"]
+__all__ += ["crowding_distances", "novelty_and_competition", "pareto_ranks"]
 
 _ARCHIVE_LIMIT = 500
 Floats = npt.NDArray[np.float64]
 
 
-class NoveltyLocalCompetitionEmitter(EmitterBase):
-    """Novelty search with local competition: be different from others, and better than those who are alike.
+class Generation(NamedTuple):
+    """A population, one row per layout, and the past it is compared with.
+
+    Attributes:
+        genomes: ``(n, d)`` its layouts, ``n`` at most ``population``.
+        scores: ``(n,)`` their scores.
+        measures: ``(n, k)`` their measures.
+        ranks: ``(n,)`` their Pareto ranks, 0 the best.
+        past: ``(m, k)`` measures of the past layouts that novelty is measured from too, oldest first.
+    """
+
+    genomes: npt.NDArray[Any]
+    scores: Floats
+    measures: Floats
+    ranks: npt.NDArray[np.int64]
+    past: Floats
+
+
+class NoveltyLocalCompetitionEmitter(WorkspaceEmitter):
+    """Novelty search with local competition: be different from others, and better than those that are alike.
 
     A population is bred as in NSGA-II (Deb et al., 2002) for two objectives (Lehman & Stanley, GECCO 2011): *novelty*,
     the mean distance of a layout's measures to its ``neighbours`` nearest ones in the population and in a list of past
@@ -45,42 +65,30 @@ class NoveltyLocalCompetitionEmitter(EmitterBase):
         seed: Seed of this emitter's draws.
     """
 
-    emits_valid = True
-
     def __init__(
         self,
         archive: ArchiveBase,
-        workspace: Any,
+        workspace: Workspace,
         *,
         population: int | None = None,
         neighbours: int = 15,
         crossover: float = 0.5,
         remember: float = 0.05,
         evaluations: int | None = None,
-        seed: int | np.random.SeedSequence | None = None,
+        seed: Seed = None,
     ) -> None:
-        if population is not None and population < 2:
-            raise ValueError(f"population must be at least 2, got {population}")
-        if neighbours < 1:
-            raise ValueError(f"neighbours must be at least 1, got {neighbours}")
+        check_at_least(2, population=population)
+        check_at_least(1, neighbours=neighbours)
         for name, value in (("crossover", crossover), ("remember", remember)):
             if not 0 <= value <= 1:
                 raise ValueError(f"{name} must be a probability, got {value}")
-        super().__init__(
-            archive,
-            solution_dim=archive.solution_dim,
-            bounds=None,
-            lower_bounds=workspace.lower_bounds,
-            upper_bounds=workspace.upper_bounds,
-        )
+        super().__init__(archive, workspace, seed=seed)
         planned = 128 if evaluations is None else min(128, max(20, evaluations // 100))
         self.population = planned if population is None else int(population)
-        self._workspace = workspace
         self._neighbours, self._crossover, self._remember = int(neighbours), float(crossover), float(remember)
-        self._rng = np.random.default_rng(seed)
         ranges = np.asarray(workspace.archive_ranges, dtype=np.float64)
         self._scale = ranges[:, 1] - ranges[:, 0]
-        self._genomes = np.zeros((0, int(archive.solution_dim)), dtype=archive.dtypes["solution"])
+        self._genomes = self._blank_genomes()
         self._scores: Floats = np.zeros(0)
         self._measures: Floats = np.zeros((0, len(ranges)))
         self._past: Floats = np.zeros((0, len(ranges)))
@@ -98,8 +106,13 @@ class NoveltyLocalCompetitionEmitter(EmitterBase):
             "remember": self._remember,
         }
 
+    @property
+    def state(self) -> Generation:
+        """The population now; a copy. Empty before the first generation."""
+        return Generation(*map(read_only, (self._genomes, self._scores, self._measures, self._ranks, self._past)))
+
     def ask(self) -> npt.NDArray[Any]:
-        """Propose ``(population, d)`` children; random layouts while there is nobody to breed from."""
+        """Propose ``(population, d)`` children; random layouts while there are no parents."""
         if not len(self._genomes):
             if self.archive.empty:
                 return self._workspace.sample(self.population, self._rng)
@@ -118,18 +131,10 @@ class NoveltyLocalCompetitionEmitter(EmitterBase):
         solution: npt.ArrayLike,
         objective: npt.ArrayLike,
         measures: npt.ArrayLike,
-        add_info: dict[str, npt.NDArray[Any]],
+        add_info: AddInfo,
         **fields: npt.ArrayLike,
     ) -> None:
-        """Let parents and children compete for the next generation.
-
-        Args:
-            solution: ``(population, d)`` what ``ask`` proposed.
-            objective: ``(population,)`` scores, NaN where a layout is not allowed; such a child dies.
-            measures: ``(population, k)`` measures.
-            add_info: Not used.
-            **fields: Not used.
-        """
+        """Let parents and children compete for the next generation; a child without a score dies."""
         scores = np.asarray(objective, dtype=np.float64)
         scored = ~np.isnan(scores)
         genomes, scores = np.asarray(solution)[scored], scores[scored]
@@ -177,15 +182,15 @@ def novelty_and_competition(measures: Floats, scores: Floats, past: Floats, neig
     n = len(measures)
     if n == 1:
         return np.zeros((1, 2))
-    everyone = np.concatenate([measures, past])
-    squares = np.zeros((n, len(everyone)))
-    for mine, theirs in zip(measures.T, everyone.T, strict=True):
+    population_and_past = np.concatenate([measures, past])
+    squares = np.zeros((n, len(population_and_past)))
+    for mine, theirs in zip(measures.T, population_and_past.T, strict=True):
         squares += (mine[:, None] - theirs) ** 2
     np.fill_diagonal(squares, np.inf)
     k = min(neighbours, n - 1)
     nearest = np.argpartition(squares[:, :n], k - 1, axis=1)[:, :k]
     outscored = (scores[nearest] < scores[:, None]).sum(axis=1)
-    k = min(neighbours, len(everyone) - 1)
+    k = min(neighbours, len(population_and_past) - 1)
     novelty = np.sqrt(np.partition(squares, k - 1, axis=1)[:, :k]).mean(axis=1)
     return np.column_stack([novelty, outscored])
 
@@ -193,15 +198,15 @@ def novelty_and_competition(measures: Floats, scores: Floats, past: Floats, neig
 def pareto_ranks(objectives: Floats) -> npt.NDArray[np.int64]:
     """Non-dominated sorting of two objectives, both maximised.
 
-    By descending first objective, an individual belongs to the first front of which nobody dominates it, and of each
-    front only the greatest second objective so far has to be known; fronts are ordered by it, so that it is found by
-    bisection (Jensen, 2003): ``O(n log n)``.
+    Taken by descending first objective, an individual belongs to the first front without a member that dominates it.
+    Of each front only the greatest second objective so far has to be known, and fronts are ordered by it, so that the
+    front is found by bisection (Jensen, 2003): ``O(n log n)``.
 
     Args:
         objectives: ``(n, 2)``.
 
     Returns:
-        ``(n,)`` rank: 0 dominated by nobody, 1 by rank 0 alone, and so on.
+        ``(n,)`` rank: 0 where no other dominates it, 1 where only rank 0 does, and so on.
     """
     first, second = objectives[:, 0], objectives[:, 1]
     order = np.lexsort((-second, -first))
@@ -214,7 +219,7 @@ def pareto_ranks(objectives: Floats) -> npt.NDArray[np.int64]:
         if point == previous:  # equals do not dominate one another
             ranks[i] = ranks[last]
             continue
-        # Everybody before has a first objective at least as great, so a front dominates where its top is as high.
+        # All before have a first objective at least as great, so a front dominates where its top is as high.
         rank = bisect_right(tops, -point[1])
         if rank == len(tops):
             tops.append(-point[1])

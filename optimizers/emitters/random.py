@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import numpy.typing as npt
-from ribs.emitters import EmitterBase
+
+from legible_envs.workspace import Workspace
+from optimizers.emitters.base import Seed, WorkspaceEmitter, check_at_least
 
 if TYPE_CHECKING:
     from ribs.archives import ArchiveBase
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
 __all__ = ["RandomWorkspaceEmitter"]
 
 
-class RandomWorkspaceEmitter(EmitterBase):
+class RandomWorkspaceEmitter(WorkspaceEmitter):
     """Valid layouts drawn independently from the workspace's own distribution.
 
     Args:
@@ -24,28 +25,17 @@ class RandomWorkspaceEmitter(EmitterBase):
         seed: Seed of the draws.
     """
 
-    emits_valid = True
-
     def __init__(
         self,
         archive: ArchiveBase,
-        workspace: Any,
+        workspace: Workspace,
         *,
         batch_size: int = 1024,
-        seed: int | np.random.SeedSequence | None = None,
+        seed: Seed = None,
     ) -> None:
-        if batch_size < 1:
-            raise ValueError(f"batch_size must be at least 1, got {batch_size}")
-        super().__init__(
-            archive,
-            solution_dim=archive.solution_dim,
-            bounds=None,
-            lower_bounds=workspace.lower_bounds,
-            upper_bounds=workspace.upper_bounds,
-        )
-        self._workspace = workspace
+        check_at_least(1, batch_size=batch_size)
+        super().__init__(archive, workspace, seed=seed)
         self._batch_size = int(batch_size)
-        self._rng = np.random.default_rng(seed)
 
     @property
     def settings(self) -> dict[str, int]:

@@ -1,6 +1,7 @@
 """Plugging in emitters: names, entry points, and the contract between an emitter and a search.
 
-**What an emitter is.** A pyribs emitter (``ribs.emitters.EmitterBase``), made by a *factory* that :func:`make_emitter`
+**What an emitter is.** A pyribs emitter (``ribs.emitters.EmitterBase``; :class:`~optimizers.WorkspaceEmitter` is one
+that already knows bounds, workspace and seed), made by a *factory* that :func:`make_emitter`
 calls with keyword arguments, those it accepts:
 
 =============== ======================================================================================================
@@ -14,9 +15,10 @@ calls with keyword arguments, those it accepts:
 
 ``ask()`` returns ``(n, d)`` genomes, ``n`` may vary; invalid ones are left out before scoring. ``tell(solution,
 objective, measures, add_info)`` gets results in the same order. An emitter that only ever proposes valid genomes of the
-workspace's type may say so with ``emits_valid = True``; it is then used as it is, and sees NaN for what is not allowed.
-Any other is wrapped in :class:`~optimizers.emitters.adapter.GenomeAdapter`, which rounds, clips and filters. It must
-pickle, or runs with it cannot be checkpointed. ``settings`` (a dict) is written to the run's manifest if present.
+workspace's type may say so with ``emits_valid = True``; it is then used as it is, and layouts that are not allowed
+score NaN. Any other is wrapped in :class:`~optimizers.emitters.adapter.GenomeAdapter`, which rounds, clips and filters.
+An emitter must pickle, or runs with it cannot be checkpointed. ``settings`` (a dict) is written to the run's manifest
+if present.
 
 **Emitters that know no workspace** (pyribs' own): where the factory has no ``workspace`` parameter it gets the archive
 with real-valued genomes, and a random layout as ``x0`` where it takes one. It is not told the bounds: what it proposes
@@ -39,6 +41,7 @@ from typing import Any
 import numpy as np
 
 from legible_envs.support.plugins import Plugin, Registry, target_of
+from legible_envs.workspace import Workspace
 from optimizers.errors import EmitterError
 
 __all__ = ["ENTRY_POINT_GROUP", "EmitterInfo", "EmitterSpec", "emitter_name", "list_emitters", "make_emitter"]
@@ -103,7 +106,7 @@ def emitter_name(spec: EmitterSpec) -> str:
 def make_emitter(
     spec: EmitterSpec,
     archive: Any,
-    workspace: Any,
+    workspace: Workspace,
     *,
     seed: int,
     evaluations: int | None = None,

@@ -128,11 +128,11 @@ class CheckpointFolder:
         return sorted(self.folder.glob("*.checkpoint")) if self.folder.is_dir() else []
 
     def _pickled(self, state: Any) -> bytes:
-        names = {id(thing): name for name, thing in self._shared.items()}
+        names = {id(shared): name for name, shared in self._shared.items()}
 
         class Pickler(pickle.Pickler):
-            def persistent_id(self, thing: Any) -> str | None:
-                return names.get(id(thing))
+            def persistent_id(self, value: Any) -> str | None:
+                return names.get(id(value))
 
         stream = io.BytesIO()
         try:

@@ -1,4 +1,4 @@
-"""The folder of a run: what a search leaves behind for people, reports and later sessions.
+"""The folder of a run: what a search leaves behind to look at, to report on and to continue from.
 
 =============== ======================================================================================================
 ``config.json`` the manifest: versions, settings, seed, git revision, and the result once there is one
@@ -23,12 +23,15 @@ from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from legible_envs.support.files import remove_leftovers, write_atomically
 from optimizers.errors import SearchError
 
-__all__ = ["COLUMNS", "RunFolder", "git_revision", "package_versions", "pickle_versions"]
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["COLUMNS", "RunFolder", "git_revision", "is_run_folder", "package_versions", "pickle_versions"]
 
 COLUMNS = (
     "iteration",
@@ -42,6 +45,15 @@ COLUMNS = (
     "evaluations_per_second",
 )
 SCHEMA = 1
+_NEEDED = ("schema", "workspace", "objective", "archive")
+_MAY_BE_EMPTY = ("best",)
+_COUNTS = ("iteration", "evaluations", "elites")
+_REALS = tuple(name for name in COLUMNS if name not in (*_COUNTS, "phase"))
+
+
+def is_run_folder(path: str | Path) -> bool:
+    """Whether the path is a folder with the manifest of a search in it."""
+    return (Path(path) / "config.json").is_file()
 
 
 class RunFolder:
@@ -87,16 +99,21 @@ class RunFolder:
         """The manifest.
 
         Raises:
-            SearchError: There is none, or it is not one.
+            SearchError: There is none, it is damaged, or this version does not read it.
         """
         try:
             config = json.loads(self._config.read_text(encoding="utf-8"))
         except FileNotFoundError as error:
-            raise SearchError(f"{self.path} is not the folder of a run: it has no config.json") from error
+            raise SearchError(f"{self.path} is not the folder of a search: it has no config.json") from error
         except ValueError as error:
-            raise SearchError(f"{self._config} is not a manifest of a run: {error}") from error
-        if not isinstance(config, dict) or config.get("schema") != SCHEMA:
-            raise SearchError(f"{self._config} is not a manifest this version reads (schema {SCHEMA})")
+            raise SearchError(f"{self._config} is not valid JSON: {error}") from error
+        if not isinstance(config, dict):
+            raise SearchError(f"{self._config} is not the manifest of a search: it holds a {type(config).__name__}")
+        missing = [key for key in _NEEDED if key not in config]
+        if missing:
+            raise SearchError(f"{self._config} is not the manifest of a search: it lacks {missing}")
+        if config["schema"] != SCHEMA:
+            raise SearchError(f"{self._config} has schema {config['schema']!r}, this version reads schema {SCHEMA}")
         return config
 
     def write_config(self, config: Mapping[str, Any]) -> None:
@@ -121,14 +138,34 @@ class RunFolder:
         with self._metrics.open("a", encoding="utf-8", newline="") as stream:
             stream.write(_as_csv([row]))
 
-    def read_metrics(self) -> list[dict[str, Any]]:
-        """All whole rows of ``metrics.csv``, numbers as numbers."""
+    def read_metrics(self) -> pd.DataFrame:
+        """All whole rows of ``metrics.csv`` (:data:`COLUMNS`), numbers as they were written; NaN where one is empty.
+
+        A killed process may leave the last line cut off; everything before it counts. No file is no rows.
+
+        Raises:
+            SearchError: The file is not a table of these columns.
+        """
+        import pandas as pd
+
         try:
-            with self._metrics.open(encoding="utf-8", newline="") as stream:
-                rows = [row for row in csv.DictReader(stream) if all(row.get(name) is not None for name in COLUMNS)]
-        except FileNotFoundError:
-            return []
-        return [{name: _number(row[name]) for name in COLUMNS} for row in rows]
+            text = self._metrics.read_text(encoding="utf-8")
+            whole_lines = text[: text.rfind("\n") + 1]
+            table = pd.read_csv(io.StringIO(whole_lines), dtype=str, keep_default_na=False)
+            missing = [name for name in COLUMNS if name not in table]
+            if missing:
+                raise SearchError(f"{self._metrics} is damaged: it lacks the columns {missing}")
+            # An absent field reads as an empty one.
+            needed = table[[name for name in COLUMNS if name not in _MAY_BE_EMPTY]]
+            whole = table.loc[(needed != "").all(axis=1), list(COLUMNS)]
+            return whole.assign(
+                **{name: [int(text) for text in whole[name]] for name in _COUNTS},
+                **{name: [float(text or "nan") for text in whole[name]] for name in _REALS},
+            )
+        except (FileNotFoundError, pd.errors.EmptyDataError):
+            return pd.DataFrame(columns=list(COLUMNS))
+        except ValueError as error:
+            raise SearchError(f"{self._metrics} is damaged: {error}") from error
 
 
 def package_versions() -> dict[str, str]:
@@ -183,15 +220,3 @@ def _as_csv(rows: Iterable[Mapping[str, Any]]) -> str:
         writer.writerow(["" if row[name] is None else row[name] for name in COLUMNS])
     return stream.getvalue()
 
-
-def _number(text: str) -> Any:
-    if text == "":
-        return None
-    try:
-        return int(text)
-    except ValueError:
-        pass
-    try:
-        return float(text)
-    except ValueError:
-        return text

@@ -1,18 +1,43 @@
-"""What a search returns, and reading it back from a run's folder."""
+"""What a search returns, and reading it back from a run's folder; nothing else reads these folders."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from optimizers.archives import WorkspaceArchive, make_archive, read_archive
-from optimizers.runs.folder import RunFolder
+from legible_envs.workspace import Workspace, make_workspace
+from optimizers.archives import WorkspaceArchive, archive_arrays, make_archive, read_archive
+from optimizers.errors import SearchError
+from optimizers.runs.folder import COLUMNS, RunFolder
 
-__all__ = ["SearchResult", "load_run"]
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["Elites", "SearchResult", "load_run"]
+
+
+@dataclass(frozen=True)
+class Elites:
+    """The layouts of an archive as arrays, one row per layout.
+
+    Attributes:
+        solution: ``(n, d)`` genomes.
+        objective: ``(n,)`` scores.
+        measures: ``(n, k)`` measures.
+        index: ``(n,)`` cells of the archive, counted row by row.
+    """
+
+    solution: npt.NDArray[Any]
+    objective: npt.NDArray[np.float64]
+    measures: npt.NDArray[np.float64]
+    index: npt.NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.objective)
 
 
 @dataclass
@@ -24,7 +49,7 @@ class SearchResult:
         archive: The archive, a pyribs ``GridArchive``.
         best_genome: ``(d,)`` genome of the best layout, without obstacles that do nothing; None if no layout scored.
         best_objective: Its score, at least that of the archive's best elite; None if no layout scored.
-        history: One dict per logged iteration, the columns of ``metrics.csv``.
+        history: One dict per logged iteration, the columns of ``metrics.csv``; :meth:`metrics` has it as a table.
         evaluations: Layouts scored.
         iterations: Batches after the initial random one.
         seconds: Wall time of the search, all sessions together.
@@ -35,7 +60,7 @@ class SearchResult:
         folder: Where it lies, or None.
     """
 
-    workspace: Any
+    workspace: Workspace
     archive: WorkspaceArchive
     best_genome: npt.NDArray[Any] | None
     best_objective: float | None
@@ -68,8 +93,35 @@ class SearchResult:
         """Share of the wall time that was not spent in the objective."""
         return 1.0 - self.evaluation_seconds / self.seconds if self.seconds > 0 else 0.0
 
+    def elites(self, *, best_first: bool = True) -> Elites:
+        """The layouts of the archive.
 
-def load_run(folder: str | Path, workspace: Any = None) -> SearchResult:
+        Args:
+            best_first: Whether they come by descending score (equal ones by cell); else they come by cell.
+        """
+        arrays = archive_arrays(self.archive)
+        order: Any = np.argsort(-arrays["objective"], kind="stable") if best_first else slice(None)
+        return Elites(**{name: values[order] for name, values in arrays.items()})
+
+    def metrics(self) -> pd.DataFrame:
+        """The history as a table, one row per logged iteration, with the columns of ``metrics.csv``."""
+        import pandas as pd
+
+        return pd.DataFrame(self.history, columns=list(COLUMNS))
+
+    def require_genome(self) -> npt.NDArray[Any]:
+        """``(d,)`` the best genome, where going on without one makes no sense.
+
+        Raises:
+            SearchError: No layout has scored yet.
+        """
+        if self.best_genome is None:
+            where = "" if self.folder is None else f"{self.folder}: "
+            raise SearchError(f"{where}the archive is empty, so there is no best layout yet; resume the search")
+        return self.best_genome
+
+
+def load_run(folder: str | Path, workspace: Workspace | None = None) -> SearchResult:
     """Read a run back from its published files; nothing is unpickled.
 
     Args:
@@ -80,30 +132,17 @@ def load_run(folder: str | Path, workspace: Any = None) -> SearchResult:
         The result; its archive holds the same elites.
 
     Raises:
-        SearchError: The folder holds no run.
-        ValueError: One of its files is damaged.
+        SearchError: The folder holds no run, or one of its files is damaged; the message names the file.
+        ValueError: The workspace of the run is not known here.
     """
     run = RunFolder(Path(folder))
+    if not run.path.is_dir():
+        raise SearchError(f"{folder} is not a folder; expected the folder of a search")
     config = run.read_config()
     if workspace is None:
-        from legible_envs.workspace import make_workspace
-
         workspace = make_workspace(config["workspace"])
-    shape = config["archive"]
-    archive = make_archive(
-        workspace,
-        seed=config["seed"],
-        dims=shape["dims"],
-        ranges=[tuple(ends) for ends in shape["ranges"]],
-        score_floor=shape["score_floor"],
-    )
-    try:
-        arrays = read_archive(run.archive)
-    except FileNotFoundError:
-        arrays = None
-    if arrays is not None and len(arrays["objective"]):
-        archive.add(arrays["solution"], arrays["objective"], arrays["measures"])
-    history = run.read_metrics()
+    archive = _read_archive(run, workspace, config)
+    history = _rows(run.read_metrics())
     last = history[-1] if history else {"evaluations": 0, "iteration": 0, "seconds": 0.0}
     finished = config.get("result") or {}
     genome, objective = finished.get("best_genome"), finished.get("best_objective")
@@ -123,3 +162,34 @@ def load_run(folder: str | Path, workspace: Any = None) -> SearchResult:
         config=config,
         folder=run.path,
     )
+
+
+def _read_archive(run: RunFolder, workspace: Workspace, config: dict[str, Any]) -> WorkspaceArchive:
+    """The archive as the run's manifest describes it, with the elites of its file."""
+    shape = config["archive"]
+    archive = make_archive(
+        workspace,
+        seed=config.get("seed"),
+        dims=shape["dims"],
+        ranges=[tuple(ends) for ends in shape["ranges"]],
+        score_floor=shape["score_floor"],
+    )
+    try:
+        arrays = read_archive(run.archive)
+    except FileNotFoundError as error:
+        raise SearchError(
+            f"{run.path} has no archive.npz: its search has not saved anything yet; continue it with resume=True "
+            "(`legible optimize --resume`)"
+        ) from error
+    if len(arrays["objective"]):
+        try:
+            archive.add(arrays["solution"], arrays["objective"], arrays["measures"])
+        except ValueError as error:
+            raise SearchError(f"{run.archive} does not fit the manifest beside it: {error}") from error
+    return archive
+
+
+def _rows(table: pd.DataFrame) -> list[dict[str, Any]]:
+    """A table as one dict per row, with None where nothing was written."""
+    rows = table.astype(object).where(table.notna(), None).to_dict("records")
+    return [{str(name): value for name, value in row.items()} for row in rows]

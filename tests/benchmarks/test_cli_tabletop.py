@@ -14,10 +14,10 @@ from PIL import Image
 
 from benchmarks.cli.app import main
 from benchmarks.presenters.tabletop_panels import CONDITIONS, boards_of
-from benchmarks.runs import read_run
 from legible_envs.tabletop import TabletopLayout, TabletopTask, VirtualObstacle
 from legible_envs.tabletop.design.workspace import TabletopWorkspace
 from legible_envs.tabletop.scoring.scorer import TabletopScorer
+from optimizers import load_run
 
 SMALL = ("--evaluations", 1200, "--quiet", "--emitter", "improve")
 
@@ -72,7 +72,7 @@ def test_show_draws_the_four_boards_and_the_desired_configuration(run: Path, tmp
         width, height = image.size
     assert width > height > 600
     titles = ["Baseline", "Placement Optimized", "Virtual Obstacle Optimized", "Both Optimized"]
-    assert [c.name for c in boards_of(read_run(run))] == titles
+    assert [c.name for c in boards_of(load_run(run))] == titles
     for title in titles:
         assert title in result.output
     elsewhere = legible("show", run, "--out", tmp_path / "figure.png")
@@ -81,7 +81,7 @@ def test_show_draws_the_four_boards_and_the_desired_configuration(run: Path, tmp
 
 
 def test_boards_are_the_layouts_of_the_runs_with_their_scores(run: Path) -> None:
-    found = {c.name: c for c in boards_of(read_run(run))}
+    found = {c.name: c for c in boards_of(load_run(run))}
     for condition, title in CONDITIONS.items():
         folder = run if condition == "both" else run / condition
         assert found[title].layout == TabletopLayout.from_json(folder / "best.json")
@@ -96,9 +96,9 @@ def test_boards_are_the_layouts_of_the_runs_with_their_scores(run: Path) -> None
 
 
 def test_the_report_shows_map_boards_and_reaches(run: Path) -> None:
-    data, source = page_data(run), read_run(run)
-    assert len(data["cells"]) == data["archive_size"] == len(source.index)
-    genome = source.solution[0]
+    data, source = page_data(run), load_run(run)
+    assert len(data["cells"]) == data["archive_size"] == len(source.elites())
+    genome = source.elites().solution[0]
     layout = source.workspace.decode(genome)
     drawn = np.array(data["cells"][0][5][: len(layout.objects)]) / 1e4
     np.testing.assert_allclose(drawn, layout.centres, atol=1e-4)
@@ -127,7 +127,7 @@ def test_resume_goes_on_with_every_condition(run: Path, tmp_path: Path) -> None:
     out = tmp_path / "run"
     shutil.copytree(run, out)
     shutil.rmtree(out / "obstacles")  # as if interrupted before the last one
-    assert [c.name for c in boards_of(read_run(out))] == ["Baseline", "Placement Optimized", "Both Optimized"]
+    assert [c.name for c in boards_of(load_run(out))] == ["Baseline", "Placement Optimized", "Both Optimized"]
     result = legible("optimize", "tabletop", "--resume", "--quiet", "--out", out)
     assert result.exit_code == 0, result.output
     for folder in ("obstacles", "placement", "."):
@@ -149,7 +149,7 @@ def test_one_condition_of_another_task_by_the_papers_budget(run: Path, tmp_path:
     result = legible(*one, "--iterations", 20, 3)
     assert result.exit_code == 0, result.output
     assert not (out / "conditions.json").exists()
-    assert [c.name for c in boards_of(read_run(out))] == ["Baseline", "Placement Optimized"]
+    assert [c.name for c in boards_of(load_run(out))] == ["Baseline", "Placement Optimized"]
     assert json.loads((out / "config.json").read_text())["iterations"] == [20, 3]
     again = legible("optimize", "tabletop", "--resume", "--quiet", "--out", out)
     assert again.exit_code == 0, again.output

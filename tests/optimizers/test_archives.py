@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from ribs.archives import GridArchive
 
 from legible_envs.overcooked import OvercookedWorkspace
+from optimizers import SearchError
 from optimizers.archives import archive_arrays, make_archive, read_archive, write_archive
 from tests.support.shelf_workspace import ShelfWorkspace
 
@@ -106,5 +107,5 @@ def test_a_damaged_file_is_refused_by_name(tmp_path, damage):
     path.write_bytes({"cut": content[: len(content) // 2], "text": b"hello", "empty": b"", "other": b""}[damage])
     if damage == "other":
         np.savez(path, solution=np.zeros(3))
-    with pytest.raises(ValueError, match=r"archive\.npz is not an archive written by a search"):
+    with pytest.raises(SearchError, match=r"archive\.npz is not an archive written by a search"):
         read_archive(path)

@@ -25,11 +25,6 @@ OPTIMUM_5X5 = -11.684924681147868  # over all valid 5x5 layouts, prefix="sum", b
 COLUMNS = "iteration,phase,evaluations,seconds,best,qd_score,coverage,elites,evaluations_per_second"
 
 
-def same_archive(a, b):
-    a, b = archive_arrays(a), archive_arrays(b)
-    return all(np.array_equal(a[name], b[name]) for name in a)
-
-
 def best_per_cell(workspace):
     """The best score of every cell, by brute force over every genome there is."""
     genomes = workspace.all_genomes()
@@ -89,7 +84,7 @@ def test_best_layout_is_pruned_and_the_archive_is_not():
 # -- the same again ----------------------------------------------------------------------------------------------------
 
 
-def test_same_seed_same_archive_other_seed_another():
+def test_same_seed_same_archive_other_seed_another(same_archive):
     workspace = OvercookedWorkspace(shape=(5, 6))
     a, b, c = (search(workspace, evaluations=4000, seed=s, emitter=["improve", "random"]) for s in (7, 7, 8))
     assert same_archive(a.archive, b.archive)
@@ -106,7 +101,7 @@ def test_leaves_the_global_random_state_alone():
     np.testing.assert_array_equal(before, np.random.get_state()[1])  # noqa: NPY002
 
 
-def test_a_drawn_seed_is_recorded_and_repeats():
+def test_a_drawn_seed_is_recorded_and_repeats(same_archive):
     result = search(SHELF, evaluations=1500, initial=50, seed=None)
     again = search(SHELF, evaluations=1500, initial=50, seed=result.config["seed"])
     assert same_archive(result.archive, again.archive)
@@ -257,7 +252,7 @@ def test_a_time_limit_stops_at_a_batch_end():
 # -- what it leaves behind ---------------------------------------------------------------------------------------------
 
 
-def test_a_run_folder_holds_manifest_metrics_archive_and_drawing(tmp_path):
+def test_a_run_folder_holds_manifest_metrics_archive_and_drawing(tmp_path, same_archive):
     workspace = OvercookedWorkspace(shape=(5, 6), prefix="sum")
     result = search(workspace, evaluations=3000, seed=4, checkpoint=tmp_path / "a" / "run", max_distance=400.0)
     folder = tmp_path / "a" / "run"
@@ -291,27 +286,7 @@ def test_a_run_folder_holds_manifest_metrics_archive_and_drawing(tmp_path):
     assert same_archive(load_run(folder).archive, result.archive)
 
 
-def test_a_run_reads_back_without_unpickling(tmp_path, monkeypatch):
-    result = search(SHELF, evaluations=3000, checkpoint=tmp_path)
-    monkeypatch.setattr("pickle.Unpickler", None)
-    monkeypatch.setattr("pickle.loads", None)
-    again = load_run(tmp_path)
-    assert again.workspace == SHELF
-    assert again.best_layout == result.best_layout
-    assert again.history == result.history
-    assert (again.evaluations, again.stopped) == (result.evaluations, "evaluations")
-    assert again.qd_score == pytest.approx(result.qd_score)
-
-
-@pytest.mark.parametrize("content", [None, "not json", "{}", "[1]"])
-def test_reading_back_what_is_no_run_says_so(tmp_path, content):
-    if content is not None:
-        (tmp_path / "config.json").write_text(content)
-    with pytest.raises(SearchError, match=r"config\.json"):
-        load_run(tmp_path)
-
-
-def test_a_run_is_not_replaced_unless_told_to(tmp_path):
+def test_a_run_is_not_replaced_unless_told_to(tmp_path, same_archive):
     first = search(SHELF, evaluations=1500, seed=1, checkpoint=tmp_path)
     (tmp_path / "notes.txt").write_text("mine")
     with pytest.raises(SearchError, match=r"already holds a run.*resume=True.*overwrite=True"):
@@ -359,7 +334,7 @@ def ctrl_c_interrupts():
 
 
 @pytest.mark.usefixtures("ctrl_c_interrupts")
-def test_ctrl_c_finishes_the_batch_saves_and_brings_the_result(tmp_path):
+def test_ctrl_c_finishes_the_batch_saves_and_brings_the_result(tmp_path, same_archive):
     def press(state):
         if state.iteration == 3:
             os.kill(os.getpid(), signal.SIGINT)
@@ -409,7 +384,7 @@ def test_ctrl_c_from_outside_leaves_a_usable_run(tmp_path):
     assert run.best_layout is not None
 
 
-def test_works_outside_the_main_thread():
+def test_works_outside_the_main_thread(same_archive):
     results = []
     thread = threading.Thread(target=lambda: results.append(search(SHELF, evaluations=1500)))
     thread.start()

@@ -7,23 +7,9 @@ from ribs.schedulers import Scheduler
 from legible_envs.tabletop import TabletopWorkspace
 from optimizers import ImproveWorkspaceEmitter, make_archive, search
 from optimizers.evaluator import Evaluator
-from tests.optimizers.test_emitters import LiteralMapElites
+from tests.oracles.map_elites_oracle import LiteralMapElites
 
 CONDITIONS = ("both", "placement", "obstacles")
-
-
-class LiteralOnArchive(LiteralMapElites):
-    """The literal algorithm where measures are real numbers: the archive says which cell they are in."""
-
-    def __init__(self, archive, *arguments):
-        super().__init__(*arguments)
-        self.archive = archive
-
-    def scored(self, genomes):
-        for genome in genomes:
-            score, measures = self.evaluate(genome[None])
-            self.evaluated.append(genome)
-            yield genome, score[0], int(self.archive.index_of(measures)[0])
 
 
 @pytest.mark.parametrize("condition", CONDITIONS)
@@ -32,7 +18,9 @@ def test_one_climb_is_the_literal_algorithm(condition):
     evaluate = Evaluator(ws)
     initial = ws.sample(20, np.random.default_rng(1))
     archive = make_archive(ws)
-    literal = LiteralOnArchive(archive, ws, evaluate, 6, np.random.default_rng(2))
+    literal = LiteralMapElites(
+        ws, evaluate, 6, np.random.default_rng(2), cell_of=lambda measures: int(archive.index_of(measures)[0])
+    )
     literal.run(initial, climbs=8)
 
     archive.add(initial, *evaluate(initial))

@@ -55,6 +55,7 @@ def write_run_of(
             "dims": list(workspace.archive_dims),
             "ranges": workspace.archive_ranges,
             "measure_names": list(workspace.measure_names),
+            "score_floor": workspace.score_floor,
         },
         "seed": 0,
         "evaluations": 1000,

@@ -1,14 +1,15 @@
 """Uniform crossover between elites: an emitter in a package of its own, found by its entry point (see README.md)."""
 
 import numpy as np
-from ribs.emitters import EmitterBase
+
+from optimizers import WorkspaceEmitter
 
 
-class CrossoverEmitter(EmitterBase):
+class CrossoverEmitter(WorkspaceEmitter):
     """Each child takes each gene from one of two random elites.
 
-    Many children are not valid (two stations on one counter, say). That is fine: an emitter that does not claim
-    ``emits_valid = True`` has its proposals checked, and those that are not layouts are left out.
+    Many children are not valid (two stations on one counter, say). That is fine: with ``emits_valid = False`` the
+    search checks the proposals and leaves out those that are not layouts.
 
     Args:
         archive: Elites to cross; never empty when ``ask`` is called.
@@ -17,17 +18,12 @@ class CrossoverEmitter(EmitterBase):
         seed: Seed of everything random.
     """
 
+    emits_valid = False
+
     def __init__(self, archive, workspace, *, batch_size=1024, seed=None):
-        super().__init__(
-            archive,
-            solution_dim=archive.solution_dim,
-            bounds=None,
-            lower_bounds=workspace.lower_bounds,
-            upper_bounds=workspace.upper_bounds,
-        )
+        super().__init__(archive, workspace, seed=seed)
         self.batch_size = batch_size
         self.settings = {"batch_size": batch_size}  # written to the manifest of a run
-        self._rng = np.random.default_rng(seed)
 
     def ask(self):
         elites = self.archive.data("solution")

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from legible_envs.errors import LayoutError
 from legible_envs.legibility import PrefixSpec, Ties, check_prefix
 from legible_envs.overcooked.design import genome_kernels as kernels
+from legible_envs.overcooked.design.keys import KitchenKeys
 from legible_envs.overcooked.design.rules import DesignRules
 from legible_envs.overcooked.layout import INGREDIENTS, STATION_TYPES, Cell, OvercookedLayout
 from legible_envs.overcooked.recipes import PAPER_SOUPS, check_recipes, soup_task
@@ -246,6 +247,10 @@ class OvercookedWorkspace(Workspace):
         simpler = np.repeat(np.asarray(genome, dtype=np.int8)[None], len(bits), axis=0)
         simpler[np.arange(len(bits)), bits] = 0
         return simpler
+
+    def key_decoder(self) -> KitchenKeys:
+        """How vectors of real numbers in [0, 1] stand for kitchens."""
+        return KitchenKeys(self.rules)
 
     def _as_int8(self, genomes: npt.ArrayLike) -> tuple[npt.NDArray[np.int8], npt.NDArray[np.bool_]]:
         """Genomes as int8, and which rows that lost nothing (NaN, fractions and large numbers cannot be genomes)."""

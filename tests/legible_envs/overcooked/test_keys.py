@@ -1,4 +1,4 @@
-"""Random keys: every vector is a valid layout, every valid layout has a vector."""
+"""Random keys of kitchens: every vector is a valid kitchen, every valid kitchen has a vector."""
 
 import numpy as np
 import pytest
@@ -6,10 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from legible_envs.overcooked import OvercookedWorkspace
-from optimizers.emitters.random_keys import BoundedKeys, KitchenKeys, random_keys
-from tests.support.shelf_workspace import ShelfWorkspace
+from legible_envs.overcooked.design.keys import KitchenKeys
 
-SHELF = ShelfWorkspace()
 KITCHENS = [
     OvercookedWorkspace(shape=(5, 5)),
     OvercookedWorkspace(shape=(5, 9), distinct_access=True, locked={"pot": (0, 3)}, forbidden=[(2, 2), (4, 4)]),
@@ -19,7 +17,7 @@ KITCHENS = [
 
 @pytest.mark.parametrize("workspace", KITCHENS, ids=["5x5", "5x9-ruled", "9x9"])
 def test_kitchens_and_keys_there_and_back(workspace):
-    keys = random_keys(workspace)
+    keys = workspace.key_decoder()
     assert isinstance(keys, KitchenKeys)
     rng = np.random.default_rng(0)
     genomes = workspace.sample(300, rng)
@@ -64,33 +62,5 @@ def literal_kitchen(workspace, keys):
 @given(st.integers(0, 2**32 - 1), st.sampled_from([KITCHENS[0], KITCHENS[2]]))
 def test_the_kernel_reads_kitchens_as_its_rules_say(seed, workspace):
     keys = np.random.default_rng(seed).random((1, workspace.genome_size))
-    decoded = random_keys(workspace).decode(keys, np.zeros((1, 0)), np.random.default_rng(0))
+    decoded = workspace.key_decoder().decode(keys, np.zeros((1, 0)), np.random.default_rng(0))
     np.testing.assert_array_equal(decoded[0], literal_kitchen(workspace, keys[0]))
-
-
-def test_keys_of_any_workspace_are_its_genes_and_are_repaired_with_the_anchor():
-    keys = random_keys(SHELF)
-    assert isinstance(keys, BoundedKeys)
-    genomes = SHELF.all_genomes()
-    np.testing.assert_array_equal(keys.decode(keys.encode(genomes), genomes, np.random.default_rng(0)), genomes)
-    raw = np.random.default_rng(1).normal(0.5, 1.0, (400, SHELF.genome_size))
-    anchors = SHELF.sample(400, np.random.default_rng(2))
-    decoded = keys.decode(raw, anchors, np.random.default_rng(3))
-    assert SHELF.valid(decoded).all()
-    # Every gene is the key's or the anchor's, and genes that were fine alone are mostly the key's.
-    own = np.clip(np.floor(np.clip(raw, 0, 1) * (SHELF.upper_bounds + 1.0)), 0, SHELF.upper_bounds)
-    assert ((decoded == own) | (decoded == anchors)).all()
-    assert (decoded == own).mean() > 0.6
-
-
-class Hopeless(ShelfWorkspace):
-    """Only one layout is valid."""
-
-    def valid(self, genomes):
-        return (np.asarray(genomes) == [0, 1, 2, 0, 0, 0]).all(axis=1)
-
-
-def test_repair_ends_at_the_anchor():
-    anchors = np.tile(np.array([[0, 1, 2, 0, 0, 0]], dtype=np.int8), (50, 1))
-    decoded = BoundedKeys(Hopeless()).decode(np.full((50, 6), 0.9), anchors, np.random.default_rng(0))
-    np.testing.assert_array_equal(decoded, anchors)

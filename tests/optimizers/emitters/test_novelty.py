@@ -6,9 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from optimizers import NoveltyLocalCompetitionEmitter, make_archive
+from optimizers import NoveltyLocalCompetitionEmitter
 from optimizers.emitters.novelty import crowding_distances, novelty_and_competition, pareto_ranks
-from optimizers.evaluator import Evaluator
 from tests.support.shelf_workspace import ShelfWorkspace
 
 SHELF = ShelfWorkspace()
@@ -16,7 +15,7 @@ POINTS = arrays(np.float64, st.tuples(st.integers(1, 25), st.just(2)), elements=
 
 
 def literal_ranks(objectives):
-    """Peel off who is dominated by nobody left."""
+    """Peel off those that none of the others left dominates."""
     left, ranks, rank = list(range(len(objectives))), np.zeros(len(objectives), dtype=int), 0
     while left:
         front = [
@@ -58,31 +57,23 @@ def test_novelty_counts_the_past_and_competition_does_not():
     np.testing.assert_array_equal(novelty_and_competition(measures[:1], scores[:1], past, 3), [[0.0, 0.0]])
 
 
-def test_the_next_generation_is_novel_or_locally_better():
-    archive, evaluate = make_archive(SHELF), Evaluator(SHELF)
-    start = SHELF.sample(200, np.random.default_rng(0))
-    archive.add(start, *evaluate(start))
+def test_the_next_generation_is_novel_or_locally_better(started, told):
+    archive, evaluate = started(SHELF, 200)
+    scale = np.ptp(SHELF.archive_ranges, axis=1)
     emitter = NoveltyLocalCompetitionEmitter(archive, SHELF, population=12, seed=1, neighbours=3)
     for _ in range(6):
         children = emitter.ask()
-        before = np.concatenate([emitter._genomes, children])
-        scores, measures = evaluate(children)
-        scores[2] = np.nan
-        everyone = np.concatenate([emitter._scores, scores]), np.concatenate([emitter._measures, measures])
-        past = emitter._past / emitter._scale
-        emitter.tell(children, scores, measures, archive.add(children, scores, measures))
+        before = emitter.state
+        scores = told(emitter, evaluate, children, unscored=[2])
         assert children.shape == (12, SHELF.genome_size)
-        living = ~np.isnan(everyone[0])
-        objectives = novelty_and_competition(everyone[1][living] / emitter._scale, everyone[0][living], past, 3)
+        genomes, scores = np.concatenate([before.genomes, children]), np.concatenate([before.scores, scores])
+        measures = np.concatenate([before.measures, SHELF.measures(children)])
+        living = ~np.isnan(scores)
+        objectives = novelty_and_competition(measures[living] / scale, scores[living], before.past / scale, 3)
         ranks = literal_ranks(objectives)
         worst_kept = np.sort(ranks)[11]
-        assert emitter._ranks.max() == worst_kept
-        sure = before[living][ranks < worst_kept]
-        assert all((emitter._genomes == genome).all(axis=1).any() for genome in sure)
-        assert len(emitter._past) <= 500
-
-
-@pytest.mark.parametrize("bad", [{"population": 1}, {"neighbours": 0}, {"crossover": 1.5}, {"remember": -0.1}])
-def test_a_bad_argument_is_named(bad):
-    with pytest.raises(ValueError, match=next(iter(bad))):
-        NoveltyLocalCompetitionEmitter(make_archive(SHELF), SHELF, **bad)
+        after = emitter.state
+        assert after.ranks.max() == worst_kept
+        sure = genomes[living][ranks < worst_kept]
+        assert all((after.genomes == genome).all(axis=1).any() for genome in sure)
+        assert len(after.past) <= 500

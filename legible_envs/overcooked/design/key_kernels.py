@@ -1,4 +1,4 @@
-"""Kernels that read a kitchen from random keys, so that every vector of keys is a valid kitchen."""
+"""Kernels that decode kitchens from random keys, so that every vector of keys is a valid kitchen."""
 
 from __future__ import annotations
 
