@@ -1,4 +1,4 @@
-"""The design of kitchens: which are allowed, how they vary, and what they score."""
+"""The design of kitchens: which are allowed, how they vary, and how they score."""
 
 from __future__ import annotations
 

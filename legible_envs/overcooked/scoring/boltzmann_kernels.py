@@ -1,7 +1,7 @@
 """Kernels of the exact legibility score of noisily rational walkers; defined in ``boltzmann``.
 
-How a trajectory goes on does not depend on where it began. So the expected weight of a prefix at a cell is computed once
-for each goal, and the forward pass of each start uses it.
+How a trajectory goes on does not depend on where it began. So the expected weight of a prefix at a cell is computed
+once for each goal, and the forward pass of each start uses it.
 """
 
 from __future__ import annotations

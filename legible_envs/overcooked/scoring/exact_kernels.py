@@ -3,8 +3,8 @@
 What is computed is defined in :mod:`legible_envs.legibility`; here it is arranged to be fast. Grids are flat arrays
 with their counter border, so that a neighbour is an offset. One flood per station gives distances and the number of
 shortest paths to every cell. A cell on a shortest path then knows the *excess cost* of every goal (how much longer the
-path through the cell is than the shortest), and one sum over the subsets of goals that are not tied serves all stages at
-once.
+path through the cell is than the shortest), and one sum over the subsets of goals that are not tied serves all stages
+at once.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""From a task and parameters to the tables the score kernel reads."""
+"""From a task and an observer to the tables of the score kernels."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The design of tables: which are allowed, how they vary, and what they score."""
+"""The design of tables: which are allowed, how they vary, and how they score."""
 
 from __future__ import annotations
 
@@ -67,8 +67,8 @@ class TabletopWorkspace(Workspace):
         obstacles_on_table: Whether obstacles must lie wholly on the table.
         obstacles_apart: Whether obstacles may neither cross nor touch one another.
         obstacle_cost: What an objective loses for every obstacle.
-        beta: Rationality per metre (Eq. 1).
-        c: Cost per ``unit`` observed in doubt (Eq. 2).
+        beta: Rationality per metre that the observer assumes (Eq. 1).
+        c: Cost per ``unit`` observed while the predicted goal is wrong (Eq. 2).
         unit: Metres.
         prefix: ``"mean"`` (ten arc-length midpoints of the reach), or observed fractions in (0, 1].
         ties: ``"expected"`` (uniform tie-breaking) or ``"strict"`` (a tie counts as wrong).
@@ -217,7 +217,7 @@ class TabletopWorkspace(Workspace):
         return self.rules.upper_bounds
 
     def decode(self, genome: npt.ArrayLike) -> TabletopLayout:
-        """The layout of one ``(d,)`` genome; a :class:`LayoutError` names thing, rule and numbers."""
+        """The layout of one ``(d,)`` genome; a :class:`LayoutError` names object, rule and numbers."""
         return self.rules.decode(as_single(genome, self.genome_size)[0])
 
     def encode(self, layout: TabletopLayout) -> Array:
@@ -255,9 +255,8 @@ class TabletopWorkspace(Workspace):
     def perturb(self, genomes: npt.NDArray[Any], k: int, rng: np.random.Generator, phase: int = 0) -> Array:
         """``(n * k, d)`` valid children of ``(n, d)`` valid parents, grouped by parent.
 
-        Objects are what varies in phase 0, obstacles in phase 1 (under ``"obstacles"`` in phase 0, the only one); how
-        is said in :func:`.perturb_genomes`. A parent that has no valid child repeats
-        itself.
+        Objects vary in phase 0, obstacles in phase 1 (under ``"obstacles"`` in phase 0, the only one);
+        :func:`.perturb_genomes` documents the changes. A parent that has no valid child repeats itself.
         """
         check_choice("phase", phase, range(self.phases))
         parents = self._as_float(genomes)
@@ -446,11 +445,11 @@ class TabletopWorkspace(Workspace):
         rng: np.random.Generator,
         **settings: Any,
     ) -> list[Trajectory]:
-        """Reaches of simulated people who each do the task at one table.
+        """Trajectories of simulated participants who each do the task at one table.
 
         Args:
             genome: ``(d,)``, or the table.
-            participants: Number of people.
+            participants: Number of participants.
             rng: Source of all randomness.
             **settings: See :func:`legible_envs.tabletop.humans.simulate_participants`.
         """

@@ -53,7 +53,7 @@ class ReachTables(NamedTuple):
         beta: Rationality per metre.
         penalty: Cost of a metre observed while the prediction is wrong.
         tie_tolerance: Excess costs up to this tie.
-        strict: Whether a tie counts as wrong rather than as a fair guess.
+        strict: Whether a tie counts as wrong rather than as a uniform guess.
     """
 
     targets: Ints

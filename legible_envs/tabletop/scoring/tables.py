@@ -1,4 +1,4 @@
-"""From a task on a table to the arrays the score kernel reads."""
+"""From a task on a table and an observer to the arrays of the score kernel."""
 
 from __future__ import annotations
 
