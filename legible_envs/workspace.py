@@ -19,9 +19,8 @@ from legible_envs.support.plugins import Registry
 
 if TYPE_CHECKING:
     from legible_envs.rollouts.trajectory import Trajectory
-    from legible_envs.workspace_checks import check_workspace
 
-__all__ = ["Objective", "ObjectiveName", "Workspace", "check_workspace", "make_workspace", "register_workspace"]
+__all__ = ["Objective", "ObjectiveName", "Workspace", "make_workspace", "register_workspace"]
 
 ObjectiveName = Literal["legibility", "efficiency", "legible-efficient"]
 Array = npt.NDArray[np.float64]
@@ -369,11 +368,3 @@ def check_choice(name: str, value: Any, allowed: Sequence[Any]) -> Any:
     if value not in allowed:
         raise ValueError(f"{name} must be one of {list(allowed)}, got {value!r}")
     return value
-
-
-def __getattr__(name: str) -> object:
-    if name == "check_workspace":
-        from legible_envs.workspace_checks import check_workspace
-
-        return check_workspace
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -22,7 +22,8 @@ from legible_envs.overcooked.scoring.boltzmann import (
 )
 from legible_envs.overcooked.scoring.explanation import ambiguity, explain_layout, grid_graph, score_layout
 from legible_envs.tasks import Subtask, TaskGraph
-from legible_envs.workspace import check_workspace, make_workspace
+from legible_envs.workspace import make_workspace
+from legible_envs.workspace_checks import check_workspace
 from tests.legible_envs.overcooked.kitchens import all_shortest_walks, random_kitchen, steps_between
 
 TINY = [

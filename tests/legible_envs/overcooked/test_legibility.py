@@ -28,6 +28,7 @@ from legible_envs.overcooked.scoring.explanation import (
     layout_distance,
     score_layout,
 )
+from legible_envs.tabletop import TabletopWorkspace
 from legible_envs.tasks import Subtask, TaskGraph
 from tests.legible_envs.overcooked.kitchens import brute_force_legibility, brute_force_reach, random_kitchen
 from tests.support.plain_python import printed_both_ways
@@ -344,3 +345,15 @@ def test_tasks_that_do_not_fit_the_kitchen():
         OvercookedWorkspace((7, 7), stations=("onion", "dish", "pot", "serving"))
     ws = OvercookedWorkspace((5, 5), stations=("onion", "dish", "pot", "serving"), recipes=[("onion",) * 3])
     assert np.isfinite(ws.legibility(ws.sample(3, np.random.default_rng(0)))).all()
+
+
+def test_workspaces_show_the_observer_their_keywords_describe():
+    ws = OvercookedWorkspace((5, 5), prefix=0.5, beta=2, c=3, ties="strict", tie_tolerance=0.1)
+    assert ws.observer == ws.scorer.observer == ObserverModel(2.0, 3.0, (0.5,), "strict", 0.1)
+    with pytest.raises(AttributeError):
+        ws.observer = ObserverModel()
+    table = TabletopWorkspace(prefix=(0.9, 0.1), beta=2, c=3, ties="strict", tie_tolerance=0.1, unit=0.2)
+    assert table.observer == ObserverModel.in_metres(2.0, 3.0, (0.9, 0.1), "strict", 0.1, 0.2)
+    assert TabletopWorkspace().observer == ObserverModel.in_metres()
+    with pytest.raises(AttributeError):
+        table.observer = ObserverModel()

@@ -10,7 +10,8 @@ from legible_envs.observer import ObserverModel
 from legible_envs.overcooked import OvercookedWorkspace
 from legible_envs.tabletop import TabletopScorer, TabletopWorkspace
 from legible_envs.tabletop.design.differentiable import DifferentiableTable
-from legible_envs.workspace import check_workspace, make_workspace
+from legible_envs.workspace import make_workspace
+from legible_envs.workspace_checks import check_workspace
 from optimizers import EmitterError, check_emitter, search
 from optimizers.archives import archive_arrays
 
