@@ -1,10 +1,10 @@
 """The legibility of a workspace, in plain Python: the definition every fast kernel is tested against.
 
 Equations are those of Tung, Luebbers, Roncone and Hayes, *Workspace Optimization Techniques to Improve Prediction of
-Human Motion During Human-Robot Collaboration* (HRI 2024). A person walks from a start to a goal along an optimal path,
-each optimal path equally likely. After every step an observer forms the posterior over the valid goals (Eq. 1). The
-walk is legible where the true goal leads by a margin, and costs the more the later the observer still cannot tell
-(Eq. 2). Eq. 3 adds this up over all stages of a task.
+Human Motion During Human-Robot Collaboration* (HRI 2024). A person moves from a start to a goal along an optimal path,
+each optimal path equally likely. After every step an observer infers the posterior over the valid goals (Eq. 1). The
+trajectory is legible where the true goal leads by a margin, and costs the more the longer the observer was wrong or
+undecided (Eq. 2). Eq. 3 adds this up over all stages of a task.
 """
 
 from __future__ import annotations
@@ -12,19 +12,17 @@ from __future__ import annotations
 import heapq
 import math
 from collections import defaultdict
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
+from legible_envs.observer import ObserverModel, PrefixSpec
 from legible_envs.tasks import TaskGraph
 
 __all__ = [
     "From",
     "Graph",
     "PrefixScore",
-    "PrefixSpec",
-    "Ties",
-    "check_prefix",
     "env_legibility",
     "goal_legibility",
     "optimal_costs",
@@ -40,13 +38,11 @@ Graph = Mapping[Node, Mapping[Node, float]]
 
 
 class From(NamedTuple):
-    """The node of a place as somewhere to leave: a person does not walk through the station they left."""
+    """The node of a place as somewhere to leave: people never pass through the station they left."""
 
     place: str
 
 
-PrefixSpec = Literal["mean", "sum"] | tuple[float, ...]
-Ties = Literal["expected", "strict"]
 Goal = TypeVar("Goal", bound=Hashable)
 
 
@@ -62,7 +58,7 @@ def posterior(
     every goal and cancels.
 
     Args:
-        remaining: ``C*(Q->G)`` for every candidate goal; ``inf`` where there is no way.
+        remaining: ``C*(Q->G)`` for every candidate goal; ``inf`` where there is no path.
         optimal: ``C*(S->G)`` for the same goals.
         beta: Rationality, per unit of cost.
         prior: Prior probability of each goal; uniform if None.
@@ -93,58 +89,35 @@ def env_legibility(
     goal: Goal,
     remaining: Mapping[Goal, float],
     optimal: Mapping[Goal, float],
-    step: float,
-    *,
-    beta: float = 1.0,
-    c: float = 1.0,
-    ties: Ties = "expected",
-    tie_tolerance: float = 1e-9,
+    observed: float,
+    observer: ObserverModel = ObserverModel(),
 ) -> float:
-    """Eq. 2: how legible one prefix of a walk to ``goal`` is.
+    """Eq. 2: how legible one prefix of a trajectory to ``goal`` is.
 
-    The margin ``p(1) - p(2)`` if the most probable goal is the true one, else ``-c * step``. Where ``k`` goals tie at
-    the top, the true one among them, the value is the expectation under uniform tie-breaking, ``-(k-1)/k * c * step``
-    (a tie has no margin), or ``-c * step`` with ``ties="strict"``. With one candidate ``p(2) = 0``.
+    The margin ``p(1) - p(2)`` if the most probable goal is the true one, else ``-c * t``, where ``t`` is what was
+    observed in the observer's units. Where ``k`` goals tie at the top, the true one among them, the value is the
+    expectation under uniform tie-breaking, ``-(k-1)/k * c * t`` (a tie has no margin), or ``-c * t`` with
+    ``ties="strict"``. With one candidate ``p(2) = 0``.
 
     Args:
         goal: The true goal.
         remaining: ``C*(Q->G)`` for every valid goal.
         optimal: ``C*(S->G)`` for every valid goal.
-        step: How much of the walk was observed, in the unit of ``c``.
-        beta: Rationality, per unit of cost.
-        c: Cost of each observed unit without knowing the goal.
-        ties: ``"expected"`` or ``"strict"``.
-        tie_tolerance: Costs this close count as equal.
+        observed: How much of the trajectory was observed, in steps or metres.
+        observer: How the observer infers goals, and what errors cost.
     """
-    top = tied_goals(remaining, optimal, tie_tolerance)
+    t = observed / observer.unit
+    top = tied_goals(remaining, optimal, observer.tie_tolerance)
     if goal not in top:
-        return -c * step
+        return -observer.c * t
     if len(top) > 1:
-        return -c * step * (1.0 if ties == "strict" else (len(top) - 1) / len(top))
-    probabilities = posterior(remaining, optimal, beta)
+        return -observer.c * t * (1.0 if observer.ties == "strict" else (len(top) - 1) / len(top))
+    probabilities = posterior(remaining, optimal, observer.beta)
     return probabilities[goal] - max((p for g, p in probabilities.items() if g != goal), default=0.0)
 
 
-def check_prefix(prefix: str | float | Iterable[float]) -> PrefixSpec:
-    """Return a valid ``prefix`` setting: ``"mean"``, ``"sum"`` or a tuple of fractions in (0, 1].
-
-    Raises:
-        ValueError: Anything else.
-    """
-    if isinstance(prefix, str):
-        if prefix == "mean":
-            return "mean"
-        if prefix == "sum":
-            return "sum"
-        raise ValueError(f"prefix must be 'mean', 'sum' or a tuple of fractions in (0, 1], got {prefix!r}")
-    fractions = tuple(float(f) for f in (prefix if isinstance(prefix, Iterable) else (prefix,)))
-    if not fractions or not all(0 < f <= 1 for f in fractions):
-        raise ValueError(f"prefix must be 'mean', 'sum' or a tuple of fractions in (0, 1], got {prefix!r}")
-    return fractions
-
-
 def prefix_weights(prefix: PrefixSpec, length: int) -> list[float]:
-    """Weight of each prefix ``t = 1 … length-1`` of a walk of ``length`` steps.
+    """Weight of each prefix ``t = 1 … length-1`` of a trajectory of ``length`` steps.
 
     ``"mean"`` weighs all equally (sum 1), ``"sum"`` gives each weight 1, and fractions ``f`` share weight 1 equally
     among the prefixes ``t = clip(round(f * length), 1, length-1)``.
@@ -161,7 +134,7 @@ def prefix_weights(prefix: PrefixSpec, length: int) -> list[float]:
 
 
 def optimal_costs(graph: Graph, goal: Node) -> dict[Node, float]:
-    """Cost of the best way from every node to ``goal`` (Dijkstra); nodes without a way are absent."""
+    """Cost-to-go from every node to ``goal``, ``C*`` (Dijkstra); nodes without a path to it are absent."""
     reverse: dict[Node, list[tuple[Node, float]]] = defaultdict(list)
     for a, edges in graph.items():
         for b, cost in edges.items():
@@ -183,14 +156,14 @@ def optimal_costs(graph: Graph, goal: Node) -> dict[Node, float]:
 
 @dataclass(frozen=True, slots=True)
 class PrefixScore:
-    """One thing an observer may see on the way to a goal.
+    """One prefix that an observer may see of trajectories to a goal.
 
     Attributes:
         step: Steps observed, ``t``.
         node: Where the person is then.
-        length: Steps of the whole walk; 0 where walks of all lengths are taken together.
-        probability: Share of all optimal walks that are here after ``step`` steps and have this length.
-        weight: Weight of this prefix in the walk's score.
+        length: Steps of the whole trajectory; 0 where trajectories of all lengths are taken together.
+        probability: Share of all optimal trajectories that are here after ``step`` steps and have this length.
+        weight: Weight of this prefix in the trajectory's score.
         tied: Goals at the top of the posterior.
         value: Eq. 2.
     """
@@ -209,28 +182,19 @@ def goal_legibility(
     start: Node,
     goal: Node,
     goals: Sequence[Node],
-    *,
-    prefix: PrefixSpec = "mean",
-    beta: float = 1.0,
-    c: float = 1.0,
-    ties: Ties = "expected",
-    tie_tolerance: float = 1e-9,
+    observer: ObserverModel = ObserverModel(),
 ) -> list[PrefixScore]:
-    """Every prefix of every optimal walk ``start -> goal``, its probability under uniform choice, and its Eq. 2.
+    """Every prefix of every optimal trajectory ``start -> goal``, its probability under uniform choice, and its Eq. 2.
 
-    The expected legibility of the reach is ``sum(s.probability * s.weight * s.value)``. Walks may differ in length
-    where step costs differ, so probabilities are resolved by step and by length.
+    The expected legibility of these trajectories is ``sum(s.probability * s.weight * s.value)``. They may differ in
+    length where step costs differ, so probabilities are resolved by step and by length.
 
     Args:
         graph: Step costs. No edge leads to the start, none leaves a goal.
-        start: Where the walk begins (step 0).
+        start: Where trajectories begin (step 0).
         goal: The true goal.
         goals: All valid goals.
-        prefix: Which prefixes count, see :func:`prefix_weights`.
-        beta: See :func:`env_legibility`.
-        c: See :func:`env_legibility`.
-        ties: See :func:`env_legibility`.
-        tie_tolerance: See :func:`env_legibility`; also decides which paths count as equally short.
+        observer: Who infers the goals. ``tie_tolerance`` also decides which paths count as equally short.
 
     Raises:
         ValueError: A goal cannot be reached from the start.
@@ -238,30 +202,28 @@ def goal_legibility(
     costs = {g: optimal_costs(graph, g) for g in goals}
     unreachable = [g for g in goals if start not in costs[g]]
     if unreachable:
-        raise ValueError(f"no way from {start!r} to {unreachable}")
+        raise ValueError(f"no path from {start!r} to {unreachable}")
     optimal = {g: costs[g][start] for g in goals}
     onward = {
         node: [
             after
             for after, step in graph[node].items()
-            if after in costs[goal] and step + costs[goal][after] - best <= tie_tolerance
+            if after in costs[goal] and step + costs[goal][after] - best <= observer.tie_tolerance
         ]
         for node, best in costs[goal].items()
     }
-    departing, arriving = _count_walks(onward, start, goal)
+    departing, arriving = _count_trajectories(onward, start, goal)
     lengths = [length for length, layer in enumerate(departing) if goal in layer]
     total = sum(departing[length][goal] for length in lengths)
     scores = []
     for length in lengths:
-        weights = prefix_weights(prefix, length)
+        weights = prefix_weights(observer.prefix, length)
         for step in range(1, length):
             for node in departing[step].keys() & arriving[length - step].keys():
                 probability = departing[step][node] * arriving[length - step][node] / total
                 remaining = {g: costs[g].get(node, math.inf) for g in goals}
-                value = env_legibility(
-                    goal, remaining, optimal, step, beta=beta, c=c, ties=ties, tie_tolerance=tie_tolerance
-                )
-                tied = tuple(tied_goals(remaining, optimal, tie_tolerance))
+                value = env_legibility(goal, remaining, optimal, step, observer)
+                tied = tuple(tied_goals(remaining, optimal, observer.tie_tolerance))
                 scores.append(PrefixScore(step, node, length, probability, weights[step - 1], tied, value))
     return scores
 
@@ -269,8 +231,8 @@ def goal_legibility(
 _Layers = list[dict[Node, int]]
 
 
-def _count_walks(onward: Mapping[Node, Sequence[Node]], start: Node, goal: Node) -> tuple[_Layers, _Layers]:
-    """Number of walks ``start -> node`` by steps taken, and ``node -> goal`` by steps left (exact integers)."""
+def _count_trajectories(onward: Mapping[Node, Sequence[Node]], start: Node, goal: Node) -> tuple[_Layers, _Layers]:
+    """Number of trajectories ``start -> node`` by steps taken, ``node -> goal`` by steps left (exact integers)."""
     before: dict[Node, list[Node]] = defaultdict(list)
     for node, following in onward.items():
         for after in following:
@@ -282,48 +244,25 @@ def _layers(edges: Mapping[Node, Sequence[Node]], origin: Node) -> _Layers:
     layers: _Layers = [{origin: 1}]
     while layers[-1]:
         following: dict[Node, int] = defaultdict(int)
-        for node, ways in layers[-1].items():
+        for node, count in layers[-1].items():
             for after in edges.get(node, ()):
-                following[after] += ways
+                following[after] += count
         layers.append(dict(following))
     return layers
 
 
-def task_legibility(
-    graph: Graph,
-    task: TaskGraph,
-    *,
-    prefix: PrefixSpec = "mean",
-    beta: float = 1.0,
-    c: float = 1.0,
-    ties: Ties = "expected",
-    tie_tolerance: float = 1e-9,
-) -> float:
+def task_legibility(graph: Graph, task: TaskGraph, observer: ObserverModel = ObserverModel()) -> float:
     """Eq. 3 per sequence: ``sum over stages (S, V) of w(S, V) * sum over G in V of E[EnvLegibility]``.
 
     Args:
         graph: Step costs, with a node ``name`` for every goal of the task and a node ``From(name)`` for every place
             where the person may stand when choosing the next.
         task: The task, whose stage weights ``w`` are exact.
-        prefix: See :func:`prefix_weights`.
-        beta: See :func:`env_legibility`.
-        c: See :func:`env_legibility`.
-        ties: See :func:`env_legibility`.
-        tie_tolerance: See :func:`env_legibility`.
+        observer: How the observer infers goals, which prefixes count, and what errors cost.
     """
     total = []
     for stage in task.stages():
         for goal in stage.goals:
-            scores = goal_legibility(
-                graph,
-                From(stage.start),
-                goal,
-                stage.goals,
-                prefix=prefix,
-                beta=beta,
-                c=c,
-                ties=ties,
-                tie_tolerance=tie_tolerance,
-            )
+            scores = goal_legibility(graph, From(stage.start), goal, stage.goals, observer)
             total += [stage.weight * s.probability * s.weight * s.value for s in scores]
     return math.fsum(total)

@@ -1,6 +1,6 @@
-"""Dynamic programming over task states: what is done, and where the person is.
+"""Dynamic programming over task states: which subtasks are done, and where the person is.
 
-Valid sequences are counted and weighed without listing one. Interchangeable subtasks are counted, not named, which
+Valid sequences are counted and weighted without listing any. Interchangeable subtasks are counted, not named, which
 keeps states few: three soups have 7,484,400 sequences and 339 states.
 """
 
@@ -44,7 +44,7 @@ class SubtaskClass:
 
     @property
     def place_after(self) -> str:
-        """Where the person is afterwards; where goals differ in that, at the first of them."""
+        """Where the person is afterwards; at the first of the goals where these differ."""
         return self.then[-1] if self.then else self.goals[0]
 
 
@@ -71,7 +71,7 @@ class StateSpace:
     @property
     def num_states(self) -> int:
         """Number of states on some valid sequence."""
-        return sum(1 for ways in self.completions.values() if ways)
+        return sum(1 for count in self.completions.values() if count)
 
     def ready(self, done: tuple[int, ...]) -> list[int]:
         """Classes of which a copy may be done next, by precedence and open groups."""

@@ -1,9 +1,9 @@
 """Tasks: precedence graphs of subtasks, and the exact weights of the stages they pass through.
 
-A person executing a task reaches for one goal after another. Which goals are valid next, and where the person stands
-when choosing, is a *stage*. Eq. 3 of Tung et al. (HRI 2024) sums the legibility of every reach over all valid
-orderings of the subtasks. That sum only needs, for every stage, how often a uniformly random valid ordering visits it,
-and those weights follow from dynamic programming over task states, without listing a single ordering.
+A person executing a task reaches for one goal after another. A *stage* is the place where the person chooses the next
+goal, and the set of goals that are valid then. Eq. 3 of Tung et al. (HRI 2024) sums the legibility of every reach over
+all valid orderings of the subtasks. That sum only needs, for every stage, how often a uniformly random valid ordering
+visits it. Dynamic programming over task states gives these weights without listing a single ordering.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ __all__ = ["Stage", "Subtask", "TaskGraph", "Transition"]
 
 @dataclass(frozen=True, slots=True)
 class Subtask:
-    """One thing to do: reach one of ``goals``, then pass through ``then``.
+    """One step of a task: reach one of ``goals``, then pass through ``then``.
 
     Attributes:
         name: Unique name within the task.
@@ -145,7 +145,7 @@ class TaskGraph:
     def __hash__(self) -> int:
         return hash((self.subtasks, self.start, tuple(sorted(self.groups.items())), self.max_open))
 
-    # -- what is valid -------------------------------------------------------------------------------------------------
+    # -- checks --------------------------------------------------------------------------------------------------------
 
     def _check_names(self) -> None:
         if not self.subtasks:
@@ -214,7 +214,7 @@ class TaskGraph:
             for first in members[:1]
         ]
 
-    # -- what users ask ------------------------------------------------------------------------------------------------
+    # -- properties, stages and sequences ------------------------------------------------------------------------------
 
     @property
     def states(self) -> StateSpace:
@@ -228,7 +228,7 @@ class TaskGraph:
 
     @property
     def num_states(self) -> int:
-        """Number of task states that lie on some valid sequence: what is done and where the person is."""
+        """Number of task states (subtasks done, place of the person) that lie on some valid sequence."""
         return self._space.num_states
 
     @property
@@ -267,7 +267,7 @@ class TaskGraph:
         return tuple(Transition(*step, 1.0) for step in self._space.sample(rng))
 
     def legs(self) -> dict[tuple[str, str], float]:
-        """Expected number of walks from each place to each other place in a uniformly random valid sequence."""
+        """Expected number of legs from each place to each other place in a uniformly random valid sequence."""
         legs: dict[tuple[str, str], float] = defaultdict(float)
         for t in self._transitions:
             stops = (t.start, t.goal, *t.then)
@@ -318,7 +318,7 @@ class TaskGraph:
             if not isinstance(entry, Mapping):
                 raise TaskError(f"subtask number {number} must be a mapping, got {type(entry).__name__}")
             _check_keys(entry, {"name", "goals"}, {"after", "then", "count"}, f"subtask number {number}")
-            # YAML reads `after:` with nothing behind it as null; a person means "nothing".
+            # YAML reads `after:` with nothing behind it as null; people mean "nothing".
             subtasks.append(Subtask(**{key: value for key, value in entry.items() if value is not None}))
         groups = data.get("groups") or {}
         if not isinstance(groups, Mapping):

@@ -20,9 +20,8 @@ from legible_envs.support.plugins import Registry
 
 if TYPE_CHECKING:
     from legible_envs.rollouts.trajectory import Trajectory
-    from legible_envs.workspace_checks import check_workspace
 
-__all__ = ["Objective", "ObjectiveName", "Workspace", "check_workspace", "make_workspace", "register_workspace"]
+__all__ = ["Objective", "ObjectiveName", "Workspace", "make_workspace", "register_workspace"]
 
 ObjectiveName = Literal["legibility", "efficiency", "legible-efficient"]
 Array = npt.NDArray[np.float64]
@@ -32,14 +31,14 @@ CALIBRATION_SIZE: Final = 1000
 
 
 class Workspace(ABC):
-    """Which layouts are allowed, how they vary, and what they score.
+    """Which layouts are allowed, how they vary, and how they score.
 
     ``d`` is :attr:`genome_size`, ``n`` a batch size. All methods on genomes take ``(n, d)`` arrays; rows that are not
     valid layouts score NaN.
 
     Attributes:
         name: Short name used in configurations, such as ``"overcooked"``.
-        phases: Number of phases of a climb; :meth:`perturb` varies something else in each.
+        phases: Number of phases of a climb; :meth:`perturb` varies another part of the layout in each.
         measure_names: Names of the two measures an archive is laid out by.
     """
 
@@ -132,7 +131,7 @@ class Workspace(ABC):
         return self._score(genomes, 0)
 
     def distance(self, genomes: npt.NDArray[Any]) -> Any:
-        """``(n,)`` expected length of all walks of one task execution; NaN where invalid; one number for one genome."""
+        """``(n,)`` expected distance of one whole task execution; NaN where invalid; one number for one genome."""
         return self._score(genomes, 1)
 
     def _score(self, genomes: npt.NDArray[Any], which: int) -> Any:
@@ -142,7 +141,7 @@ class Workspace(ABC):
         return float(self.scores(np.asarray(genomes)[None])[which][0])
 
     def penalty(self, genomes: npt.NDArray[Any]) -> Array:
-        """``(n,)`` what an objective subtracts from the score, in its unit; zero unless a workspace says otherwise."""
+        """``(n,)`` penalty that an objective subtracts from the score; zero unless a workspace overrides this."""
         return np.zeros(len(genomes))
 
     @cached_property
@@ -205,18 +204,20 @@ class Workspace(ABC):
     def simulate(
         self, genome: npt.ArrayLike, participants: int, rng: np.random.Generator, **settings: Any
     ) -> list[Trajectory]:
-        """Reaches of simulated people in one layout, each doing the whole task; not every workspace has people.
+        """Trajectories of simulated participants who each do the whole task in one layout.
 
         Args:
             genome: ``(d,)`` or a layout.
-            participants: Number of people.
+            participants: Number of participants.
             rng: Source of all randomness.
-            **settings: Of the people, which the workspace names.
+            **settings: Of the participants; each workspace documents its own.
 
         Raises:
-            NotImplementedError: This workspace has none.
+            NotImplementedError: This workspace has no simulated participants.
         """
-        raise NotImplementedError(f"{type(self).__name__} has no simulated people; its class can define `simulate`")
+        raise NotImplementedError(
+            f"{type(self).__name__} has no simulated participants; its class can define `simulate`"
+        )
 
     # -- configuration ---------------------------------------------------------------------------------------------
 
@@ -377,11 +378,3 @@ def check_choice(name: str, value: Any, allowed: Sequence[Any]) -> Any:
     if value not in allowed:
         raise ValueError(f"{name} must be one of {list(allowed)}, got {value!r}")
     return value
-
-
-def __getattr__(name: str) -> object:
-    if name == "check_workspace":
-        from legible_envs.workspace_checks import check_workspace
-
-        return check_workspace
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

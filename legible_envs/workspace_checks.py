@@ -1,4 +1,4 @@
-"""What a third-party workspace gets wrong, in words."""
+"""Checks of a third-party workspace; every problem found is said in a sentence."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ CHILDREN = 4
 
 
 def check_workspace(workspace: Workspace, *, seed: int = 0) -> None:
-    """Check everything a search, an environment or a report relies on.
+    """Check what a search, an environment or a report relies on.
 
-    Bounds, samples, children, scores, measures, decoding, pruning, pickling, configuration, repeatability, and that
-    the global random state stays alone.
+    Bounds, samples, children, scores, measures, decoding, pruning, pickling, configuration and repeatability; and that
+    the workspace leaves numpy's global random state alone.
 
     Args:
         workspace: The workspace to try.

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from legible_envs.drawing import Image
     from legible_envs.overcooked.recipes import Recipe
+    from legible_envs.overcooked.scoring.scorer import OvercookedScorer
     from legible_envs.rollouts.trajectory import Trajectory
     from optimizers import SearchResult
     from predictors import GoalPredictor
@@ -34,29 +35,25 @@ class Kitchen(Design):
     thing: ClassVar[str] = "kitchen"
 
     def _summary_outside(self) -> dict[str, Any]:
-        from legible_envs.overcooked.scoring.explanation import score_layout
-
-        return dict(score_layout(self.layout, **self._score_settings()))
+        return self._scorer.score_layout(self.layout)
 
     def _explain_outside(self) -> list[dict[str, Any]]:
-        from legible_envs.overcooked.scoring.explanation import explain_layout
-
-        return explain_layout(self.layout, **self._score_settings())
+        return self._scorer.explain_layout(self.layout)
 
     def ambiguity(self) -> npt.NDArray[np.float64]:
         """``(H, W)`` how often an observer would name a wrong goal, NaN where nobody walks."""
         if self.genome is not None:
             return np.asarray(self.workspace.ambiguity(self.genome))
-        from legible_envs.overcooked.scoring.explanation import ambiguity
+        return self._scorer.ambiguity(self.layout)
 
-        return ambiguity(self.layout, **self._score_settings())
-
-    def _score_settings(self) -> dict[str, Any]:
-        """What was asked for, in the words of :mod:`legible_envs.overcooked.scoring.explanation`."""
+    @property
+    def _scorer(self) -> OvercookedScorer:
+        from legible_envs.observer import ObserverModel
         from legible_envs.overcooked.recipes import soup_task
+        from legible_envs.overcooked.scoring.scorer import OvercookedScorer
 
-        settings = dict(self.settings)
-        return {"task": soup_task(self.soups, settings.pop("pots", None)), **settings}
+        observer = ObserverModel(prefix=self.settings.get("prefix", "mean"))
+        return OvercookedScorer(soup_task(self.soups, self.settings.get("pots")), observer=observer)
 
     @property
     def soups(self) -> tuple[Recipe, ...]:

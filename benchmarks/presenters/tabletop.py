@@ -48,17 +48,18 @@ class TableDesign(Design):
 
     @property
     def _scorer(self) -> TabletopScorer:
+        from legible_envs.observer import ObserverModel
         from legible_envs.tabletop.scoring.scorer import TabletopScorer
 
         if self.workspace is not None:
             return self.workspace.scorer  # type: ignore[no-any-return]
         assert self.task is not None
-        return TabletopScorer(self.task, **{k: v for k, v in self.settings.items() if k == "prefix"})
+        return TabletopScorer(self.task, observer=ObserverModel.in_metres(prefix=self.settings.get("prefix", "mean")))
 
     def _summary_outside(self) -> dict[str, Any]:
         assert self.task is not None
         scorer = self._scorer
-        scores = scorer.layout(self.layout)
+        scores = scorer.score_layouts([self.layout])
         legibility = float(scores.legibility[0])
         return {
             "score": legibility,
@@ -74,12 +75,9 @@ class TableDesign(Design):
         }
 
     def _explain_outside(self) -> list[dict[str, Any]]:
-        from legible_envs.tabletop.scoring.explanation import explain_table
-
-        assert self.task is not None
-        if np.isnan(self._scorer.layout(self.layout).legibility[0]):
+        if np.isnan(self._scorer.score_layouts([self.layout]).legibility[0]):
             return []
-        return explain_table(self.layout, self.task.graph, fractions=self._scorer.tables.fractions.tolist())
+        return self._scorer.explain_layout(self.layout)
 
     def facts(self) -> list[tuple[str, str]]:
         """Score, way, detours, task, and the rule it breaks."""

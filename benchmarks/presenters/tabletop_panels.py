@@ -53,7 +53,7 @@ def boards_of(run: SearchResult) -> list[Condition]:
             found.append((title, layout, "the best layout found" if name == "placement" else note))
     conditions = []
     for title, layout, note in found:
-        scores = scorer.layout(layout)
+        scores = scorer.score_layouts([layout])
         score = float(scores.legibility[0])
         conditions.append(
             Condition(
@@ -101,4 +101,4 @@ def listed(folder: Path) -> dict[str, str]:
 
 def beta_of(workspace: Any) -> float:
     """Rationality per metre of a workspace, or the field's where there is none."""
-    return 20.0 if workspace is None else float(workspace.beta)
+    return 20.0 if workspace is None else float(workspace.observer.beta)

@@ -53,7 +53,7 @@ def table_scoring(settings: Settings) -> list[Figure]:
     samplers: dict[str, Callable[[], float]] = {}
     for obstacles in settings.table_obstacles:
         workspace, genomes = tables_with(obstacles, settings.tables)
-        samplers[_key(obstacles)] = _sampler(workspace.scorer.genomes, genomes, settings.seconds)
+        samplers[_key(obstacles)] = _sampler(workspace.scorer.score_genomes, genomes, settings.seconds)
     tea = TabletopWorkspace("tea", "placement", max_obstacles=0)
     genomes = tea.sample(settings.tables, np.random.default_rng(0))
     centres, stages = genomes.reshape(len(genomes), -1, 2), stages_of(tea.task)
@@ -65,7 +65,7 @@ def table_scoring(settings: Settings) -> list[Figure]:
             straight_line_loss(start, one, labels, stages)
         return len(few)
 
-    samplers["score tea"] = _sampler(tea.scorer.genomes, genomes, settings.seconds)
+    samplers["score tea"] = _sampler(tea.scorer.score_genomes, genomes, settings.seconds)
     samplers["tea loss"] = lambda: rate(literal, settings.seconds)
     samplers["tea losses"] = _sampler(lambda some: straight_line_losses(start, some, stages), centres, settings.seconds)
     samples = alternate(samplers, settings.rounds)

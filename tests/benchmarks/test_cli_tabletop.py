@@ -90,9 +90,7 @@ def test_boards_are_the_layouts_of_the_runs_with_their_scores(run: Path) -> None
         assert found[title].score == pytest.approx(summary["score"])
         assert found[title].detour == pytest.approx(summary["mean_detour"])
     assert found["Baseline"].layout == TabletopTask.named("columns").layout
-    assert found["Baseline"].score == pytest.approx(
-        float(TabletopScorer().layout(found["Baseline"].layout).legibility[0])
-    )
+    assert found["Baseline"].score == pytest.approx(TabletopScorer().score_layout(found["Baseline"].layout)["score"])
 
 
 def test_the_report_shows_map_boards_and_reaches(run: Path) -> None:
@@ -189,7 +187,7 @@ def test_tables_outside_the_design_rules_are_scored_and_said_to_be(tmp_path: Pat
     result = legible("score", tmp_path / "mine.json")
     assert result.exit_code == 0, result.output
     found = values(result)
-    assert float(found["legibility"]) == pytest.approx(float(TabletopScorer().layout(layout).legibility[0]), abs=1e-3)
+    assert float(found["legibility"]) == pytest.approx(TabletopScorer().score_layout(layout)["score"], abs=1e-3)
     assert found["design rules"].startswith("outside: ")
     shown = legible("show", tmp_path / "mine.json", "--out", tmp_path / "mine.png")
     assert shown.exit_code == 0, shown.output

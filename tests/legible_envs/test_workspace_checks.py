@@ -7,7 +7,8 @@ import pytest
 
 from legible_envs.errors import WorkspaceError
 from legible_envs.overcooked import OvercookedWorkspace
-from legible_envs.workspace import check_workspace, register_workspace
+from legible_envs.workspace import register_workspace
+from legible_envs.workspace_checks import check_workspace
 
 
 @pytest.mark.parametrize("arguments", [{}, {"shape": (5, 9), "pots": 1}, {"cell_costs": np.full((7, 7), 1.5)}])

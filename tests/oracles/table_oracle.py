@@ -8,6 +8,7 @@ import numpy as np
 import shapely
 
 from legible_envs.legibility import env_legibility
+from legible_envs.observer import ObserverModel
 from legible_envs.tabletop import TabletopLayout
 
 SHRINK = 1e-9
@@ -116,6 +117,7 @@ def reach_points(layout, start, goal, fractions):
 def legibility(layout, task, *, beta=20.0, c=1.0, unit=0.05, fractions=None, ties="expected", tie_tolerance=1e-9):
     """Eq. 3 per sequence by its definition: every stage, every goal, every prefix, every cost anew."""
     fractions = [(i + 0.5) / 10 for i in range(10)] if fractions is None else fractions
+    observer = ObserverModel(beta=beta, c=c, ties=ties, tie_tolerance=tie_tolerance, unit=unit)
     oracle = PathOracle(layout)
     lengths = {}
 
@@ -135,15 +137,6 @@ def legibility(layout, task, *, beta=20.0, c=1.0, unit=0.05, fractions=None, tie
             points, length = reaches[stage.start, goal]
             for f, point in zip(fractions, points, strict=True):
                 remaining = {g: costs(point)[g] for g in stage.goals}
-                value = env_legibility(
-                    goal,
-                    remaining,
-                    optimal,
-                    f * length / unit,
-                    beta=beta,
-                    c=c,
-                    ties=ties,
-                    tie_tolerance=tie_tolerance,
-                )
+                value = env_legibility(goal, remaining, optimal, f * length, observer)
                 total.append(stage.weight * value / len(fractions))
     return math.fsum(total)

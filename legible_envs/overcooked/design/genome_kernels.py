@@ -1,6 +1,6 @@
 """Kernels that draw random kitchen genomes and change them a little.
 
-What a genome holds is said in :mod:`legible_envs.overcooked.scoring.genome_kernels`.
+See :mod:`legible_envs.overcooked.scoring.genome_kernels` for the parts of a genome.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ def change(genome: Genomes, kind: int, geometry: Geometry, rng: np.random.Genera
     Args:
         genome: ``[d]`` a valid genome.
         kind: 0 move a station to a free counter, 1 swap two stations, 2 add an obstacle, 3 remove one.
-        geometry: Where things may stand.
+        geometry: Where stations and obstacles may stand.
         rng: Source of randomness.
 
     Returns:

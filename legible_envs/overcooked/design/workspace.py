@@ -1,4 +1,4 @@
-"""The design of kitchens: which are allowed, how they vary, and what they score."""
+"""The design of kitchens: which are allowed, how they vary, and how they score."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.errors import LayoutError
-from legible_envs.legibility import PrefixSpec, Ties, check_prefix
+from legible_envs.observer import ObserverModel, Ties, check_prefix
 from legible_envs.overcooked.design import genome_kernels as kernels
 from legible_envs.overcooked.design.keys import KitchenKeys
 from legible_envs.overcooked.design.rules import DesignRules
 from legible_envs.overcooked.layout import INGREDIENTS, STATION_TYPES, Cell, OvercookedLayout
 from legible_envs.overcooked.recipes import PAPER_SOUPS, check_recipes, soup_task
-from legible_envs.overcooked.scoring import explanation as scoring
-from legible_envs.overcooked.scoring.boltzmann import check_human
+from legible_envs.overcooked.scoring.boltzmann import HumanModel, HumanName
 from legible_envs.overcooked.scoring.genome_kernels import score_genomes, valid_genomes
+from legible_envs.overcooked.scoring.scorer import OvercookedScorer
 from legible_envs.overcooked.scoring.tables import make_tables
 from legible_envs.support.validation import check_costs, check_finite
 from legible_envs.tasks import TaskGraph
@@ -48,16 +48,16 @@ class OvercookedWorkspace(Workspace):
 
     Args:
         shape: Rows and columns, at least 3 each.
-        prefix: Which prefixes of a walk count: ``"mean"`` over all, their ``"sum"``, or a tuple of fractions.
-        c: Cost per step that the observer is in doubt (Eq. 2).
-        beta: Rationality per unit of path cost (Eq. 1).
+        prefix: Which prefixes of a trajectory count: ``"mean"`` over all, their ``"sum"``, or a tuple of fractions.
+        c: Cost per step observed while the predicted goal is wrong (Eq. 2).
+        beta: Rationality per unit of path cost that the observer assumes (Eq. 1).
         ties: ``"expected"`` (uniform tie-breaking) or ``"strict"`` (a tie counts as wrong).
-        tie_tolerance: Path costs this close count as equal.
-        human: How people walk: ``"shortest"``, uniformly over all shortest paths, or ``"boltzmann"``, noisily rational
+        tie_tolerance: Excess costs this close to the least tie with it.
+        human: How people move: ``"shortest"``, uniformly over all shortest paths, or ``"boltzmann"``, noisily rational
             (:mod:`legible_envs.overcooked.scoring.boltzmann`). Distances are those of shortest paths in either case.
-        rationality: Of ``human="boltzmann"``, per unit of path cost; 1.3 if None, as recorded people.
-        horizon: Of ``human="boltzmann"``: steps after which a walk is given up; scores are those of walks that arrive.
-            Twice the longest conceivable shortest walk if None.
+        rationality: Of ``human="boltzmann"``, per unit of path cost; 1.3 if None, the mean of recorded participants.
+        horizon: Of ``human="boltzmann"``: steps after which a trajectory is truncated; scores are those of trajectories
+            that arrive. Twice the length of the longest conceivable shortest path if None.
         recipes: Soups of the default task.
         pots: How many soups may be in progress at once; None means precedence only, as in the paper's appendix.
         task: A :class:`~legible_envs.tasks.TaskGraph` over station types (or its ``to_dict()``), in place of
@@ -69,7 +69,13 @@ class OvercookedWorkspace(Workspace):
         distinct_access: Whether two stations may not share the cell they are used from.
         start_from: An existing kitchen (layout or ASCII); it is the first layout of every sample.
         relocation_cost: What an objective loses for every station that stands elsewhere than in ``start_from``.
-        cell_costs: ``(H, W)`` cost of stepping on each cell (> 0), for walker and observer alike; None means 1 each.
+        cell_costs: ``(H, W)`` cost of stepping on each cell (> 0), for people and observer alike; None means 1 each.
+
+    Attributes:
+        task: The :class:`~legible_envs.tasks.TaskGraph`.
+        scorer: The :class:`~legible_envs.overcooked.scoring.scorer.OvercookedScorer` of single layouts.
+        rules: The :class:`~legible_envs.overcooked.design.rules.DesignRules`.
+        human: Name of the model of people; ``rationality`` and ``horizon`` are its settings.
 
     Raises:
         LayoutError: Shape, stations, locked or forbidden cells, or ``start_from`` break a rule.
@@ -96,7 +102,7 @@ class OvercookedWorkspace(Workspace):
         beta: float = 1.0,
         ties: Ties = "expected",
         tie_tolerance: float = 1e-9,
-        human: str = "shortest",
+        human: HumanName = "shortest",
         rationality: float | None = None,
         horizon: int | None = None,
         recipes: Sequence[Sequence[str]] = PAPER_SOUPS,
@@ -111,11 +117,7 @@ class OvercookedWorkspace(Workspace):
         relocation_cost: float = 0.0,
         cell_costs: npt.ArrayLike | None = None,
     ) -> None:
-        self.prefix: PrefixSpec = check_prefix(prefix)
-        self.c = check_finite("c", c, minimum=0.0)
-        self.beta = check_finite("beta", beta, minimum=0.0)
-        self.ties: Ties = check_choice("ties", ties, ("expected", "strict"))
-        self.tie_tolerance = check_finite("tie_tolerance", tie_tolerance, minimum=0.0)
+        observer = ObserverModel(beta, c, check_prefix(prefix), ties, tie_tolerance)
         self.relocation_cost = check_finite("relocation_cost", relocation_cost, minimum=0.0)
         self.recipes = check_recipes(recipes)
         self.pots = pots
@@ -131,19 +133,12 @@ class OvercookedWorkspace(Workspace):
         )
         self.shape, self.stations = self.rules.shape, self.rules.stations
         self.ranked = self._checked_ranked(ranked)
-        people = check_human(human, rationality, horizon, len(self.rules.inner))
+        people = HumanModel(human, rationality, horizon).within(len(self.rules.inner))
         self.human, self.rationality, self.horizon = people.name, people.rationality, people.horizon
-        self._tables = make_tables(
-            self.task,
-            self.stations,
-            num_floor=max(len(self.rules.inner), self.horizon or 0),
-            prefix=self.prefix,
-            beta=self.beta,
-            c=self.c,
-            ties=self.ties,
-            tie_tolerance=self.tie_tolerance,
-        )
-        self.cell_costs = check_costs(cell_costs, self.shape, self.tie_tolerance)
+        longest = max(len(self.rules.inner), self.horizon or 0)
+        self._tables = make_tables(self.task, self.stations, observer, num_floor=longest)
+        self.cell_costs = check_costs(cell_costs, self.shape, observer.tie_tolerance)
+        self.scorer = OvercookedScorer(self.task, observer=observer, human=people, cell_costs=self.cell_costs)
         self._home = None if self.start_from is None else self.rules.encode(self.start_from)
 
     def _locked_cells(self, locked: Mapping[str, Cell] | Sequence[str] | None) -> dict[str, Cell]:
@@ -263,21 +258,27 @@ class OvercookedWorkspace(Workspace):
 
     # -- scores ----------------------------------------------------------------------------------------------------
 
+    @property
+    def observer(self) -> ObserverModel:
+        """How the observer infers goals, which prefixes count, and what errors cost."""
+        return self.scorer.observer
+
     def scores(self, genomes: npt.NDArray[Any]) -> tuple[Array, Array]:
         """``(n,)`` legibility and ``(n,)`` expected floor moves per task execution; NaN where invalid."""
         batch, in_range = self._as_int8(genomes)
         legibility, distance = np.empty(len(batch)), np.empty(len(batch))
         score_genomes(batch, self.rules.geometry, self._tables, legibility, distance)
         costs = np.ones(self.rules.geometry.num_cells) if self.cell_costs is None else self.cell_costs.ravel()
+        strict = self.observer.ties == "strict"
         if self.rationality is not None and self.horizon is not None:
             from legible_envs.overcooked.scoring.boltzmann_kernels import score_genomes_boltzmann
 
-            people = self.ties == "strict", self.rationality, self.horizon
+            people = strict, self.rationality, self.horizon
             score_genomes_boltzmann(batch, self.rules.geometry, self._tables, costs, *people, legibility)
         elif self.cell_costs is not None:
             from legible_envs.overcooked.scoring.weighted_kernels import score_genomes_weighted
 
-            score_genomes_weighted(batch, self.rules.geometry, self._tables, costs, self.ties == "strict", legibility)
+            score_genomes_weighted(batch, self.rules.geometry, self._tables, costs, strict, legibility)
         legibility[~in_range] = np.nan
         distance[~in_range] = np.nan
         return legibility, distance
@@ -330,39 +331,33 @@ class OvercookedWorkspace(Workspace):
 
     # -- one layout ------------------------------------------------------------------------------------------------
 
-    def _score_settings(self) -> dict[str, Any]:
-        return {
-            "prefix": self.prefix,
-            "beta": self.beta,
-            "c": self.c,
-            "ties": self.ties,
-            "tie_tolerance": self.tie_tolerance,
-            "cell_costs": self.cell_costs,
-            "human": self.human,
-            "rationality": self.rationality,
-            "horizon": self.horizon,
-        }
-
     def _one(self, genome: npt.ArrayLike | OvercookedLayout) -> OvercookedLayout:
         if isinstance(genome, OvercookedLayout):
             return self.decode(self.encode(genome))
         return self.decode(genome)
 
     def summary(self, genome: npt.ArrayLike | OvercookedLayout) -> dict[str, Any]:
-        """Score, distance and what belongs beside them; see :func:`.score_layout`."""
+        """Score, distance and what belongs beside them, as plain data.
+
+        See :func:`~legible_envs.overcooked.scoring.explanation.score_layout` for the keys. Workspaces that start
+        from an existing kitchen add ``relocations``.
+        """
         layout = self._one(genome)
-        result = scoring.score_layout(layout, self.task, **self._score_settings())
+        result = self.scorer.score_layout(layout)
         if self._home is not None:
             result["relocations"] = int(self.relocations(self.encode(layout)[None])[0])
         return result
 
     def explain(self, genome: npt.ArrayLike | OvercookedLayout) -> list[dict[str, Any]]:
-        """Where the layout wins and loses its score; see :func:`.explain_layout`."""
-        return scoring.explain_layout(self._one(genome), self.task, **self._score_settings())
+        """Where the layout wins and loses its score: a row per stage and goal, the greatest loss first.
+
+        See :func:`~legible_envs.overcooked.scoring.explanation.explain_layout` for what a row holds.
+        """
+        return self.scorer.explain_layout(self._one(genome))
 
     def ambiguity(self, genome: npt.ArrayLike | OvercookedLayout) -> Array:
-        """``(H, W)`` how often the goal is in doubt at each cell; see :func:`.scoring.ambiguity`."""
-        return scoring.ambiguity(self._one(genome), self.task, **self._score_settings())
+        """``(H, W)`` how often an observer would predict a wrong goal at each cell; NaN off all trajectories."""
+        return self.scorer.ambiguity(self._one(genome))
 
     # -- configuration ---------------------------------------------------------------------------------------------
 
@@ -373,11 +368,11 @@ class OvercookedWorkspace(Workspace):
         rng: np.random.Generator,
         **settings: Any,
     ) -> list[Trajectory]:
-        """Walks of simulated people who cook in one kitchen.
+        """Trajectories of simulated participants who cook in one kitchen.
 
         Args:
             genome: ``(d,)``, or the kitchen.
-            participants: Number of people.
+            participants: Number of participants.
             rng: Source of all randomness.
             **settings: See :func:`legible_envs.overcooked.humans.simulate_participants`.
         """
@@ -387,14 +382,15 @@ class OvercookedWorkspace(Workspace):
 
     def to_config(self) -> dict[str, Any]:
         """Settings as JSON-ready data; ``make_workspace`` and the constructor read them back."""
+        observer = self.observer
         return {
             "workspace": self.name,
             "shape": list(self.shape),
-            "prefix": self.prefix if isinstance(self.prefix, str) else list(self.prefix),
-            "c": self.c,
-            "beta": self.beta,
-            "ties": self.ties,
-            "tie_tolerance": self.tie_tolerance,
+            "prefix": observer.prefix if isinstance(observer.prefix, str) else list(observer.prefix),
+            "c": observer.c,
+            "beta": observer.beta,
+            "ties": observer.ties,
+            "tie_tolerance": observer.tie_tolerance,
             "human": self.human,
             **({} if self.human == "shortest" else {"rationality": self.rationality, "horizon": self.horizon}),
             "recipes": [list(recipe) for recipe in self.recipes],

@@ -1,23 +1,24 @@
-"""The score of noisily rational people, ``human="boltzmann"``: the readable definition, and how people are described.
+"""The score of noisily rational people, ``human="boltzmann"``: the readable definition, and the models of people.
 
-At every node of the way to its goal a *Boltzmann walker* draws the next step from a local softmax,
+At every node of its trajectory a *Boltzmann walker* draws the next step from a local softmax,
 
     ``P(a -> b | G) ∝ exp(-rationality * (cost(a, b) + C*(b -> G)))``,
 
 over the steps from which the goal can be reached: to a free neighbouring cell (back where it came from, too), or into
-the goal station, where the walk ends. This is the walker whose rationality
-:func:`~legible_envs.overcooked.humans.fit_rationality` estimates from recorded play.
+the goal station, where the trajectory ends. :func:`~legible_envs.overcooked.humans.fit_rationality` estimates the
+rationality of this walker from recorded play.
 
-The observer is the same as ever: Eq. 1 with optimal costs, which depends on start and current cell alone. Off the
-shortest ways its most probable goal may be wrong, which costs ``c`` per step observed (Eq. 2).
+The observer is the same as for shortest paths: Eq. 1 with optimal costs, which depends on start and current cell alone.
+Off the shortest paths its most probable goal may be wrong, which costs ``c`` per step observed (Eq. 2).
 
-**Horizon.** Walks have no longest length, so they are followed for ``horizon`` steps (the first one enters the start's
-access cell, the last one the goal station). The score is the expectation over walks that arrive within the horizon,
-``E[value | arrived]``; the probability not to have arrived, ``lost_mass``, is left out, and reported beside the score.
+**Horizon.** Trajectories have no greatest length, so they are followed for ``horizon`` steps (the first one enters the
+start's access cell, the last one the goal station). The score is the expectation over trajectories that arrive within
+the horizon, ``E[value | arrived]``. The probability not to have arrived, ``truncated_probability``, is left out of the
+score and reported beside it.
 
-**Limit.** As ``rationality`` grows the walker takes, at every cell, each of the steps that lead on by a shortest way
-equally often. ``human="shortest"`` draws each shortest *way* equally often. The two are the same where shortest ways do
-not fork unevenly (in corridors, for example) and differ a little elsewhere, for ways with few forks are then likelier.
+**Limit.** As ``rationality`` grows the walker takes, at every cell, each step along a shortest path equally often.
+``human="shortest"`` draws each shortest *path* equally often. The two are the same where shortest paths do not fork
+unevenly (in corridors, for example) and differ a little elsewhere, because the walker prefers paths with few forks.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final, Literal, NamedTuple
+from typing import Final, Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -33,22 +34,21 @@ from legible_envs.legibility import (
     Graph,
     Node,
     PrefixScore,
-    PrefixSpec,
-    Ties,
     env_legibility,
     optimal_costs,
     prefix_weights,
     tied_goals,
 )
+from legible_envs.observer import ObserverModel, PrefixSpec
 
 __all__ = [
     "DEFAULT_RATIONALITY",
-    "BoltzmannWalks",
+    "BoltzmannTrajectories",
     "HumanModel",
+    "HumanName",
     "PrefixVisit",
     "boltzmann_legibility",
-    "boltzmann_walks",
-    "check_human",
+    "boltzmann_trajectories",
     "step_probabilities",
 ]
 
@@ -60,51 +60,55 @@ DEFAULT_RATIONALITY: Final = 1.3
 
 @dataclass(frozen=True)
 class HumanModel:
-    """How people are assumed to walk.
+    """How people are assumed to move through a kitchen.
 
     Attributes:
-        name: ``"shortest"`` or ``"boltzmann"``.
-        rationality: Per unit of path cost; None for ``"shortest"``.
-        horizon: Steps after which a walk is given up; None for ``"shortest"``.
+        name: ``"shortest"``, uniformly over all shortest paths, or ``"boltzmann"``, noisily rational.
+        rationality: Of ``"boltzmann"``, per unit of path cost, greater than 0; :data:`DEFAULT_RATIONALITY` if None.
+        horizon: Of ``"boltzmann"``: steps after which a trajectory is truncated; None for twice the length of the
+            longest conceivable shortest path.
+
+    Raises:
+        ValueError: An unknown name, a number out of range, or settings of another model.
     """
 
     name: HumanName = "shortest"
     rationality: float | None = None
     horizon: int | None = None
 
+    def __post_init__(self) -> None:
+        if self.name not in get_args(HumanName):
+            raise ValueError(f"human must be one of {list(get_args(HumanName))}, got {self.name!r}")
+        if self.name == "shortest":
+            given = [key for key in ("rationality", "horizon") if getattr(self, key) is not None]
+            if given:
+                raise ValueError(f"{' and '.join(given)} belong to human='boltzmann', got human='shortest'")
+            return
+        rationality = DEFAULT_RATIONALITY if self.rationality is None else self.rationality
+        is_number = isinstance(rationality, int | float | np.number) and not isinstance(rationality, bool)
+        if not is_number or not 0 < rationality < math.inf:
+            raise ValueError(f"rationality must be a finite number > 0, got {rationality!r}")
+        object.__setattr__(self, "rationality", float(rationality))
 
-def check_human(human: str, rationality: float | None, horizon: int | None, num_floor: int) -> HumanModel:
-    """The model of people that three settings describe.
+    def within(self, num_floor: int) -> HumanModel:
+        """The same model with a horizon that suits kitchens of at most ``num_floor`` floor cells.
 
-    Args:
-        human: ``"shortest"`` or ``"boltzmann"``.
-        rationality: Per unit of path cost, greater than 0; :data:`DEFAULT_RATIONALITY` if None.
-        horizon: Longest walk, in steps; twice the longest conceivable shortest walk if None.
-        num_floor: Greatest number of floor cells. A shortest walk has at most ``num_floor + 1`` steps, and no horizon
-            may be shorter, so that some walk always arrives.
+        A shortest trajectory there has at most ``num_floor + 1`` steps. No horizon may be shorter, so that some
+        trajectory always arrives.
 
-    Raises:
-        ValueError: An unknown name, a number out of range, or settings of another model.
-    """
-    longest = num_floor + 1
-    if human == "shortest":
-        given = [key for key, value in (("rationality", rationality), ("horizon", horizon)) if value is not None]
-        if given:
-            raise ValueError(f"{' and '.join(given)} belong to human='boltzmann', got human='shortest'")
-        return HumanModel()
-    if human != "boltzmann":
-        raise ValueError(f"human must be one of ['shortest', 'boltzmann'], got {human!r}")
-    rationality = DEFAULT_RATIONALITY if rationality is None else rationality
-    number = isinstance(rationality, int | float | np.number) and not isinstance(rationality, bool)
-    if not number or not 0 < rationality < math.inf:
-        raise ValueError(f"rationality must be a finite number > 0, got {rationality!r}")
-    horizon = 2 * longest if horizon is None else horizon
-    if isinstance(horizon, bool) or not isinstance(horizon, int | np.integer) or horizon < longest:
-        raise ValueError(
-            f"horizon must be an integer of at least {longest} steps, which the longest of all shortest walks in "
-            f"{num_floor} cells may take; got {horizon!r}"
-        )
-    return HumanModel("boltzmann", float(rationality), int(horizon))
+        Raises:
+            ValueError: The horizon is no integer, or too short.
+        """
+        if self.name == "shortest":
+            return self
+        longest = num_floor + 1
+        horizon = 2 * longest if self.horizon is None else self.horizon
+        if isinstance(horizon, bool) or not isinstance(horizon, int | np.integer) or horizon < longest:
+            raise ValueError(
+                f"horizon must be an integer of at least {longest} steps, the length of the longest conceivable "
+                f"shortest trajectory through {num_floor} cells; got {horizon!r}"
+            )
+        return HumanModel(self.name, self.rationality, int(horizon))
 
 
 def step_probabilities(
@@ -126,13 +130,13 @@ def step_probabilities(
 
 
 class PrefixVisit(NamedTuple):
-    """Where walks are after some steps.
+    """Where trajectories are after some steps.
 
     Attributes:
         step: Steps observed, ``t``.
         node: Where the person is then.
-        probability: Share of the arriving walks that are here after ``step`` steps.
-        weight: Mean weight of this prefix in the score of these walks, which differ in length.
+        probability: Share of the arriving trajectories that are here after ``step`` steps.
+        weight: Mean weight of this prefix in the score of these trajectories, which differ in length.
     """
 
     step: int
@@ -141,33 +145,33 @@ class PrefixVisit(NamedTuple):
     weight: float
 
 
-class BoltzmannWalks(NamedTuple):
-    """All walks from a start to a goal within the horizon.
+class BoltzmannTrajectories(NamedTuple):
+    """All trajectories from a start to a goal within the horizon.
 
     Attributes:
         goal: Where they end.
         visits: Where they are, step by step, given that they arrive.
-        lost_mass: Probability not to arrive within the horizon.
+        truncated_probability: Probability not to arrive within the horizon.
         mean_length: Expected steps of those that arrive.
     """
 
     goal: Node
     visits: list[PrefixVisit]
-    lost_mass: float
+    truncated_probability: float
     mean_length: float
 
 
-def boltzmann_walks(
+def boltzmann_trajectories(
     graph: Graph, start: Node, goal: Node, *, rationality: float, horizon: int, prefix: PrefixSpec = "mean"
-) -> BoltzmannWalks:
-    """Follow the walker forwards, step by step, and weigh each prefix by the walks it may become.
+) -> BoltzmannTrajectories:
+    """Follow the walker forwards, step by step, and weigh each prefix by the trajectories it may become.
 
     Args:
         graph: Step costs. No edge leads to the start, none leaves a goal.
-        start: Where the walk begins (step 0).
+        start: Where trajectories begin (step 0).
         goal: Where it ends.
         rationality: Per unit of cost.
-        horizon: Longest walk, in steps.
+        horizon: Length of the longest trajectory, in steps.
         prefix: Which prefixes count, see :func:`~legible_envs.legibility.prefix_weights`.
 
     Raises:
@@ -175,7 +179,7 @@ def boltzmann_walks(
     """
     to_goal = optimal_costs(graph, goal)
     if start not in to_goal:
-        raise ValueError(f"no way from {start!r} to {goal!r}")
+        raise ValueError(f"no path from {start!r} to {goal!r}")
     nodes = list(to_goal)
     index = {node: i for i, node in enumerate(nodes)}
     steps = np.zeros((len(nodes), len(nodes)))
@@ -193,7 +197,7 @@ def boltzmann_walks(
     by_length = arrives[:, index[start]]
     arrived = math.fsum(by_length)
     if arrived == 0.0:
-        raise ValueError(f"no walk from {start!r} to {goal!r} arrives within {horizon} steps")
+        raise ValueError(f"no trajectory from {start!r} to {goal!r} arrives within {horizon} steps")
     weights = np.zeros((horizon + 1, horizon + 1))
     for length in range(2, horizon + 1):
         weights[length, 1:length] = prefix_weights(prefix, length)
@@ -207,34 +211,28 @@ def boltzmann_walks(
             for i in np.flatnonzero(passed)
         ]
     mean_length = float(np.arange(horizon + 1) @ by_length) / arrived
-    return BoltzmannWalks(goal, visits, max(0.0, 1.0 - arrived), mean_length)
+    return BoltzmannTrajectories(goal, visits, max(0.0, 1.0 - arrived), mean_length)
 
 
 def boltzmann_legibility(
     graph: Graph,
     start: Node,
     goals: Sequence[Node],
-    walks: BoltzmannWalks,
-    *,
-    beta: float = 1.0,
-    c: float = 1.0,
-    ties: Ties = "expected",
-    tie_tolerance: float = 1e-9,
+    trajectories: BoltzmannTrajectories,
+    observer: ObserverModel = ObserverModel(),
 ) -> list[PrefixScore]:
-    """Every prefix of the walks of a Boltzmann walker, its probability, and its Eq. 2.
+    """Every prefix of the trajectories of a Boltzmann walker, its probability, and its Eq. 2.
 
-    The counterpart of :func:`~legible_envs.legibility.goal_legibility`: the expected legibility of the reach is
-    ``sum(s.probability * s.weight * s.value)``. Walks of all lengths are taken together (``length`` is 0).
+    The counterpart of :func:`~legible_envs.legibility.goal_legibility`: the expected legibility of these trajectories
+    is ``sum(s.probability * s.weight * s.value)``. Trajectories of all lengths are taken together (``length`` is 0).
 
     Args:
         graph: Step costs. No edge leads to the start, none leaves a goal.
-        start: Where the walk begins (step 0).
-        goals: All valid goals, that of the walks among them.
-        walks: What :func:`boltzmann_walks` says of this start and the true goal.
-        beta: See :func:`~legible_envs.legibility.env_legibility`, also for the rest.
-        c: Cost per step in doubt.
-        ties: ``"expected"`` or ``"strict"``.
-        tie_tolerance: Costs this close count as equal.
+        start: Where trajectories begin (step 0).
+        goals: All valid goals, that of the trajectories among them.
+        trajectories: Those of this start and the true goal; prefixes are weighted as :func:`boltzmann_trajectories`
+            was told.
+        observer: How the observer infers goals, and what errors cost.
 
     Raises:
         ValueError: A goal cannot be reached from the start.
@@ -242,20 +240,17 @@ def boltzmann_legibility(
     costs = {g: optimal_costs(graph, g) for g in goals}
     unreachable = [g for g in goals if start not in costs[g]]
     if unreachable:
-        raise ValueError(f"no way from {start!r} to {unreachable}")
+        raise ValueError(f"no path from {start!r} to {unreachable}")
     optimal = {g: costs[g][start] for g in goals}
     seen = {}
-    for node in {visit.node for visit in walks.visits}:
+    for node in {visit.node for visit in trajectories.visits}:
         remaining = {g: costs[g].get(node, math.inf) for g in goals}
-        value = env_legibility(
-            walks.goal, remaining, optimal, 1, beta=beta, c=c, ties=ties, tie_tolerance=tie_tolerance
-        )
-        seen[node] = tuple(tied_goals(remaining, optimal, tie_tolerance)), value
+        value = env_legibility(trajectories.goal, remaining, optimal, 1, observer)
+        seen[node] = tuple(tied_goals(remaining, optimal, observer.tie_tolerance)), value
     scores = []
-    for step, node, probability, weight in walks.visits:
+    for step, node, probability, weight in trajectories.visits:
         top, value = seen[node]
-        # A margin is a margin at any step; doubt costs in proportion to the steps, so its first step says it all.
-        scores.append(
-            PrefixScore(step, node, 0, probability, weight, top, value if top == (walks.goal,) else step * value)
-        )
+        # A margin is the same at any step; an error costs in proportion to the steps, so that of one step says it all.
+        value = value if top == (trajectories.goal,) else step * value
+        scores.append(PrefixScore(step, node, 0, probability, weight, top, value))
     return scores

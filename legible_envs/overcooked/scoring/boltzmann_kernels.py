@@ -1,7 +1,7 @@
 """Kernels of the exact legibility score of noisily rational walkers; defined in ``boltzmann``.
 
-Where walks may end does not depend on where they begin, so what a prefix at a cell will weigh is computed once for each
-goal, and then met by the forward pass of each start.
+How a trajectory goes on does not depend on where it began. So the expected weight of a prefix at a cell is computed
+once for each goal, and the forward pass of each start uses it.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def weigh_prefixes(prefix_weights: Floats, arrives: Floats, future: Floats) -> N
     """Write to ``future [H + 1, n]`` the expected weight of a prefix of ``t`` steps at each cell.
 
     It is the sum over the steps still to come, ``r``, of the probability to arrive with them times the weight
-    ``prefix_weights[t + r, t]``; walks longer than ``H`` weigh nothing.
+    ``prefix_weights[t + r, t]``; trajectories longer than ``H`` weigh nothing.
     """
     horizon = len(arrives) - 1
     future[:] = 0.0
@@ -112,9 +112,9 @@ def add_stages(
         relative: ``[K]`` scratch.
 
     Returns:
-        ``(margin, doubt)``: expected margin, and expected number of wrong guesses.
+        ``(margin, wrong)``: expected margin, and expected number of wrong predictions.
     """
-    margin, doubt = 0.0, 0.0
+    margin, wrong = 0.0, 0.0
     for g in range(len(excess)):
         relative[g] = np.exp(-tables.beta * max(0.0, excess[g] - excess[goal]))
     for goals in range(len(weights)):
@@ -133,12 +133,12 @@ def add_stages(
                 if g != goal:
                     second = max(second, relative[g])
         if excess[goal] - least > tables.tie_tolerance:
-            doubt += weights[goals]
+            wrong += weights[goals]
         elif tied > 1:
-            doubt += weights[goals] * (1.0 if strict else (tied - 1.0) / tied)
+            wrong += weights[goals] * (1.0 if strict else (tied - 1.0) / tied)
         else:
             margin += weights[goals] * (1.0 - second) / total
-    return margin, doubt
+    return margin, wrong
 
 
 @kernel
@@ -180,8 +180,8 @@ def score_cells_boltzmann(
                 if presence[cell] != 0.0:
                     for g in range(num_goals):
                         excess[g] = best[g, cell] - best[g, start]
-                    margin, doubt = add_stages(excess, goal, tables.stage_weights[s], tables, strict, relative)
-                    total += (margin * presence[cell] - tables.c * doubt * waiting[cell]) / arrived
+                    margin, wrong = add_stages(excess, goal, tables.stage_weights[s], tables, strict, relative)
+                    total += (margin * presence[cell] - tables.c * wrong * waiting[cell]) / arrived
     return total
 
 
@@ -200,12 +200,12 @@ def score_genomes_boltzmann(
 
     Args:
         genomes: ``[B, d]``.
-        geometry: Where things may stand.
+        geometry: Where stations and obstacles may stand.
         tables: Task and parameters; ``prefix_weights`` reaches as far as ``horizon``.
         costs: ``[n]`` cost of stepping on each cell.
         strict: Whether any tie counts as wrong.
         rationality: Of the walker, per unit of cost.
-        horizon: Longest walk, in steps.
+        horizon: Length of the longest trajectory, in steps.
         legibility: ``[B]`` output.
     """
     floor = np.full(geometry.num_cells, BLOCKED, dtype=np.int32)

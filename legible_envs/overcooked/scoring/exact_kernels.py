@@ -2,20 +2,21 @@
 
 What is computed is defined in :mod:`legible_envs.legibility`; here it is arranged to be fast. Grids are flat arrays
 with their counter border, so that a neighbour is an offset. One flood per station gives distances and the number of
-shortest paths to every cell. A cell on a shortest path then knows the *slack* of every goal (how much longer the way
-through the cell is than the best), and one sum over the subsets of goals that are not tied serves all stages at once.
+shortest paths to every cell. A cell on a shortest path then knows the *excess cost* of every goal (how much longer the
+path through the cell is than the shortest), and one sum over the subsets of goals that are not tied serves all stages
+at once.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from legible_envs.support.compiled import kernel
 
-__all__ = ["ScoreTables", "flood", "make_scratch", "score_cells"]
+__all__ = ["ScoreTables", "Scratch", "flood", "make_scratch", "score_cells"]
 
 FREE = -1
 BLOCKED = -2
@@ -29,13 +30,13 @@ class ScoreTables(NamedTuple):
         goals: ``[K]`` station index of each goal.
         stage_weights: ``[S, 2**K]`` expected visits of the stage (start, set of valid goals).
         tie_penalties: ``[S, K, 2**K]`` by start, true goal and set of tied goals: expected visits of the stages in
-            which the tie leaves the goal in doubt, times the probability to guess wrong.
-        discounts: ``[D]`` ``exp(-beta * slack)`` for whole numbers of steps.
-        prefix_weights: ``[L, L]`` weight of the prefix of ``t`` steps of a walk of ``l`` steps, at ``[l, t]``.
-        legs: ``[N, N]`` expected number of walks from station to station in one task execution.
-        c: Cost per step observed in doubt.
+            which these goals tie, times the probability to predict a wrong one.
+        discounts: ``[D]`` ``exp(-beta * excess)`` for whole numbers of steps.
+        prefix_weights: ``[L, L]`` weight of the prefix of ``t`` steps of a trajectory of ``l`` steps, at ``[l, t]``.
+        legs: ``[N, N]`` expected number of legs from station to station in one task execution.
+        c: Cost per step observed while the prediction is wrong.
         beta: Rationality per unit of cost.
-        tie_tolerance: Slacks up to this count as ties.
+        tie_tolerance: Goals tie up to this excess cost.
     """
 
     starts: npt.NDArray[np.int64]
@@ -48,6 +49,36 @@ class ScoreTables(NamedTuple):
     c: float
     beta: float
     tie_tolerance: float
+
+
+class Scratch(NamedTuple):
+    """Working memory of :func:`score_cells`; ``N`` stations, ``n`` cells, ``K`` goals.
+
+    Attributes:
+        distance: ``[N, n]`` moves from each station's access cell.
+        paths: ``[N, n]`` number of shortest paths from there.
+        queue: ``[n]`` cells in the order of a flood.
+        excess: ``[K]`` excess cost of each goal at one cell, in steps.
+        discounts: ``[K]`` ``exp(-beta * excess)`` of each goal that does not tie.
+        shares: ``[K]`` weighted share of the trajectories to each goal that pass the cell.
+        free: ``[K]`` the goals that do not tie.
+        masks: ``[2**K]``, like the next three: see :func:`clean_margins`.
+        sums: Sums of discounts.
+        highest: Greatest discounts.
+        margins: Margins of the true goal.
+    """
+
+    distance: npt.NDArray[np.int32]
+    paths: npt.NDArray[np.float64]
+    queue: npt.NDArray[np.int64]
+    excess: npt.NDArray[np.int64]
+    discounts: npt.NDArray[np.float64]
+    shares: npt.NDArray[np.float64]
+    free: npt.NDArray[np.int64]
+    masks: npt.NDArray[np.int64]
+    sums: npt.NDArray[np.float64]
+    highest: npt.NDArray[np.float64]
+    margins: npt.NDArray[np.float64]
 
 
 @kernel
@@ -82,16 +113,16 @@ def flood(
         cell = queue[head]
         head += 1
         following = distance[cell] + 1
-        ways = paths[cell]
+        count = paths[cell]
         for offset in (-stride, stride, 1, -1):
             after = cell + offset
             if distance[after] == FREE:
                 distance[after] = following
-                paths[after] = ways
+                paths[after] = count
                 queue[tail] = after
                 tail += 1
             elif distance[after] == following:
-                paths[after] += ways
+                paths[after] += count
     return tail
 
 
@@ -108,7 +139,7 @@ def clean_margins(
     """Margin ``p(1) - p(2)`` of a goal that leads alone, against every subset of the goals that do not tie.
 
     Args:
-        discounts: ``[K]`` relative posterior ``exp(-beta * slack)`` of each goal.
+        discounts: ``[K]`` relative posterior ``exp(-beta * excess)`` of each goal.
         free: ``[K]`` the goals that do not tie, in the first ``num_free`` places.
         num_free: How many they are.
         masks: ``[2**K]`` output: the subsets as bit masks over all goals.
@@ -139,21 +170,21 @@ def clean_margins(
 
 
 @kernel
-def make_scratch(num_cells: int, num_stations: int, num_goals: int) -> Any:
-    """Working memory of :func:`score_cells`, allocated once per batch."""
+def make_scratch(num_cells: int, num_stations: int, num_goals: int) -> Scratch:
+    """Allocate what :func:`score_cells` needs, once per batch."""
     subsets = 1 << num_goals
-    return (
-        np.empty((num_stations, num_cells), dtype=np.int32),
-        np.empty((num_stations, num_cells), dtype=np.float64),
-        np.empty(num_cells, dtype=np.int64),
-        np.empty(num_goals, dtype=np.int64),
-        np.empty(num_goals, dtype=np.float64),
-        np.empty(num_goals, dtype=np.float64),
-        np.empty(num_goals, dtype=np.int64),
-        np.empty(subsets, dtype=np.int64),
-        np.empty(subsets, dtype=np.float64),
-        np.empty(subsets, dtype=np.float64),
-        np.empty(subsets, dtype=np.float64),
+    return Scratch(
+        distance=np.empty((num_stations, num_cells), dtype=np.int32),
+        paths=np.empty((num_stations, num_cells), dtype=np.float64),
+        queue=np.empty(num_cells, dtype=np.int64),
+        excess=np.empty(num_goals, dtype=np.int64),
+        discounts=np.empty(num_goals, dtype=np.float64),
+        shares=np.empty(num_goals, dtype=np.float64),
+        free=np.empty(num_goals, dtype=np.int64),
+        masks=np.empty(subsets, dtype=np.int64),
+        sums=np.empty(subsets, dtype=np.float64),
+        highest=np.empty(subsets, dtype=np.float64),
+        margins=np.empty(subsets, dtype=np.float64),
     )
 
 
@@ -163,7 +194,7 @@ def score_cells(
     stride: int,
     access: npt.NDArray[np.int64],
     tables: ScoreTables,
-    scratch: Any,
+    scratch: Scratch,
 ) -> tuple[float, float]:
     """Legibility per task execution (Eq. 3) and expected floor moves of one kitchen.
 
@@ -172,12 +203,14 @@ def score_cells(
         stride: Columns of the grid.
         access: ``[N]`` index of the floor cell from which each station is used.
         tables: Task and parameters.
-        scratch: See :func:`make_scratch`.
+        scratch: Room to work in, see :func:`make_scratch`.
 
     Returns:
         ``(legibility, distance)``; both NaN where two stations are not connected.
     """
-    distance, paths, queue, slack, discounts, shares, free, masks, sums, highest, margins = scratch
+    distance, paths, queue = scratch.distance, scratch.paths, scratch.queue
+    excess, discounts, shares, free = scratch.excess, scratch.discounts, scratch.shares, scratch.free
+    masks, sums, highest, margins = scratch.masks, scratch.sums, scratch.highest, scratch.margins
     moves = 0.0
     reached = 0
     for a in range(len(access)):
@@ -198,27 +231,27 @@ def score_cells(
             tied, num_free, on_path = 0, 0, 0
             for g in range(num_goals):
                 station = tables.goals[g]
-                slack[g] = here + distance[station, cell] - distance[start, access[station]]
-                if slack[g] <= tables.tie_tolerance:
+                excess[g] = here + distance[station, cell] - distance[start, access[station]]
+                if excess[g] <= tables.tie_tolerance:
                     tied |= 1 << g
                 else:
-                    discounts[g] = tables.discounts[slack[g]]
+                    discounts[g] = tables.discounts[excess[g]]
                     free[num_free] = g
                     num_free += 1
-                if slack[g] == 0:
+                if excess[g] == 0:
                     on_path |= 1 << g
             if on_path == 0:
                 continue
             step = here + 1
-            doubt = 0.0
+            wrong = 0.0
             for g in range(num_goals):
                 if on_path & (1 << g):
                     station = tables.goals[g]
                     goal_cell = access[station]
                     share = paths[start, cell] * paths[station, cell] / paths[start, goal_cell]
                     shares[g] = share * tables.prefix_weights[distance[start, goal_cell] + 2, step]
-                    doubt += shares[g] * tables.tie_penalties[s, g, tied]
-            total -= tables.c * step * doubt
+                    wrong += shares[g] * tables.tie_penalties[s, g, tied]
+            total -= tables.c * step * wrong
             for u in range(clean_margins(discounts, free, num_free, masks, sums, highest, margins)):
                 visits = 0.0
                 for g in range(num_goals):

@@ -1,30 +1,31 @@
 """The score of any one kitchen, explained: recorded ones, Overcooked-AI's, and those no genome can express.
 
 These functions follow the readable definition, so stations may repeat, stand inside and have several access cells.
-Where a type repeats, each of its stations is a goal, the person leaves from each of them equally often, and walks that
-follow a goal (to the pot, to serving) go to the nearest.
+Where a type repeats, each of its stations is a goal, the person leaves from each of them equally often, and the legs
+that follow a goal (to the pot, to serving) lead to the nearest.
 """
 
 from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any, NamedTuple, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from legible_envs.errors import LayoutError
-from legible_envs.legibility import From, Node, PrefixScore, PrefixSpec, Ties, check_prefix, goal_legibility
+from legible_envs.legibility import From, Node, PrefixScore, goal_legibility
+from legible_envs.observer import ObserverModel
 from legible_envs.overcooked.layout import FLOOR, OvercookedLayout
 from legible_envs.overcooked.recipes import soup_task
 from legible_envs.overcooked.scoring.boltzmann import (
-    BoltzmannWalks,
+    BoltzmannTrajectories,
     HumanModel,
+    HumanName,
     boltzmann_legibility,
-    boltzmann_walks,
-    check_human,
+    boltzmann_trajectories,
 )
 from legible_envs.tasks import TaskGraph
 
@@ -57,51 +58,52 @@ def grid_graph(
     return graph
 
 
-class _Reach(NamedTuple):
-    """One reach of the task: where from, among which goals, for which one, how often, and what may be seen of it."""
+class _StageGoal(NamedTuple):
+    """A stage and its true goal: from where, among which goals, how often, and what an observer may see of it."""
 
     start: str
     goals: tuple[str, ...]
     goal: str
     weight: float
     scores: list[PrefixScore]
-    lost_mass: float = 0.0
+    truncated_probability: float = 0.0
 
 
-def _reaches(
+def _stage_goals(
     layout: OvercookedLayout,
     task: TaskGraph,
+    observer: ObserverModel,
+    human: HumanModel | HumanName,
     cell_costs: npt.NDArray[np.float64] | None,
-    human: HumanModel,
-    settings: Mapping[str, Any],
-) -> Iterator[_Reach]:
+) -> Iterator[_StageGoal]:
+    """Every stage of the task with each of its goals, scored by the readable definition."""
+    human = human_model(layout, human)
     graph = grid_graph(layout, cell_costs)
-    walks: dict[tuple[str, str], BoltzmannWalks] = {}
-    observer = {key: value for key, value in settings.items() if key != "prefix"}
+    followed: dict[tuple[str, str], BoltzmannTrajectories] = {}
     for stage in task.stages():
         starts = _instances(layout, stage.start)
         goals = tuple(name for kind in stage.goals for name in _instances(layout, kind))
         for start in starts:
             for goal in goals:
-                lost_mass = 0.0
+                truncated = 0.0
                 try:
                     if human.rationality is None or human.horizon is None:
-                        scores = goal_legibility(graph, From(start), goal, goals, **settings)
+                        scores = goal_legibility(graph, From(start), goal, goals, observer)
                     else:
-                        if (start, goal) not in walks:
-                            walks[start, goal] = boltzmann_walks(
+                        if (start, goal) not in followed:
+                            followed[start, goal] = boltzmann_trajectories(
                                 graph,
                                 From(start),
                                 goal,
                                 rationality=human.rationality,
                                 horizon=human.horizon,
-                                prefix=settings["prefix"],
+                                prefix=observer.prefix,
                             )
-                        lost_mass = walks[start, goal].lost_mass
-                        scores = boltzmann_legibility(graph, From(start), goals, walks[start, goal], **observer)
+                        truncated = followed[start, goal].truncated_probability
+                        scores = boltzmann_legibility(graph, From(start), goals, followed[start, goal], observer)
                 except ValueError as error:
                     raise LayoutError(f"the task cannot be done in this kitchen: {error}", rule="reachable") from error
-                yield _Reach(start, goals, goal, stage.weight / len(starts), scores, lost_mass)
+                yield _StageGoal(start, goals, goal, stage.weight / len(starts), scores, truncated)
 
 
 def _instances(layout: OvercookedLayout, kind: str) -> tuple[str, ...]:
@@ -111,12 +113,14 @@ def _instances(layout: OvercookedLayout, kind: str) -> tuple[str, ...]:
     return names
 
 
-def _settings(prefix: Any, beta: float, c: float, ties: Ties, tie_tolerance: float) -> dict[str, Any]:
-    return {"prefix": check_prefix(prefix), "beta": beta, "c": c, "ties": ties, "tie_tolerance": tie_tolerance}
+def human_model(layout: OvercookedLayout, human: HumanModel | HumanName) -> HumanModel:
+    """The model of people of that name, with a horizon that suits one kitchen.
 
-
-def _people(layout: OvercookedLayout, human: str, rationality: float | None, horizon: int | None) -> HumanModel:
-    return check_human(human, rationality, horizon, int(np.count_nonzero(layout.cells == FLOOR)))
+    Raises:
+        ValueError: An unknown name, or a horizon too short for this kitchen.
+    """
+    human = human if isinstance(human, HumanModel) else HumanModel(human)
+    return human.within(int(np.count_nonzero(layout.cells == FLOOR)))
 
 
 def layout_distance(layout: OvercookedLayout, task: TaskGraph) -> float:
@@ -140,7 +144,7 @@ def layout_distance(layout: OvercookedLayout, task: TaskGraph) -> float:
             moves.append(sum(reached) / len(reached) if b in goals else min(reached))
         leg = sum(moves) / len(moves)
         if math.isinf(leg):
-            raise LayoutError(f"the task cannot be done in this kitchen: no way from {a} to {b}", rule="reachable")
+            raise LayoutError(f"the task cannot be done in this kitchen: no path from {a} to {b}", rule="reachable")
         total.append(expected * leg)
     return math.fsum(total)
 
@@ -149,52 +153,40 @@ def score_layout(
     layout: OvercookedLayout,
     task: TaskGraph | None = None,
     *,
-    prefix: PrefixSpec = "mean",
-    beta: float = 1.0,
-    c: float = 1.0,
-    ties: Ties = "expected",
-    tie_tolerance: float = 1e-9,
+    observer: ObserverModel = ObserverModel(),
+    human: HumanModel | HumanName = "shortest",
     cell_costs: npt.NDArray[np.float64] | None = None,
-    human: str = "shortest",
-    rationality: float | None = None,
-    horizon: int | None = None,
 ) -> dict[str, Any]:
     """Score any kitchen.
 
     Args:
         layout: The kitchen.
         task: The task, over station types; the paper's three soups if None.
-        prefix: Which prefixes count, see :func:`~legible_envs.legibility.prefix_weights`.
-        beta: Rationality per unit of cost.
-        c: Cost per step in doubt.
-        ties: ``"expected"`` or ``"strict"``.
-        tie_tolerance: Costs this close count as equal.
-        cell_costs: ``(H, W)`` cost of stepping on each cell, None for 1.
-        human: How people walk, ``"shortest"`` or ``"boltzmann"``; see :mod:`legible_envs.overcooked.scoring.boltzmann`.
-        rationality: Of ``human="boltzmann"``.
-        horizon: Of ``human="boltzmann"``.
+        observer: How the observer infers goals, which prefixes count, and what errors cost.
+        human: How people move: a model, or ``"shortest"`` or ``"boltzmann"`` with its default settings.
+        cell_costs: ``(H, W)`` cost of stepping on each cell, for people and observer alike; None for 1.
 
     Returns:
         ``score`` (Eq. 3 per sequence); ``distance`` (floor moves per execution); ``normalised``, the score over the
         expected number of (stage, goal) pairs, at most 1 for ``prefix="mean"``; ``single_goal_share``, the part of the
         score that comes from stages with one valid goal, and ``single_goal_score``; ``num_obstacles``;
-        ``candidate_set`` (``"task"``: valid by precedence); ``num_sequences``; ``num_stages``; ``human``. Where
-        that is ``"boltzmann"`` also ``rationality``, ``horizon``, ``lost_mass`` (probability that a reach of the task
-        does not arrive within the horizon; the score is that of those that do) and ``largest_lost_mass`` of a reach.
+        ``candidate_set`` (``"task"``: valid by precedence); ``num_sequences``; ``num_stages``; ``layout_id``;
+        ``human``. For ``"boltzmann"`` also ``rationality``, ``horizon``, ``truncated_probability`` (that a trajectory
+        of the task does not arrive within the horizon; the score is that of those that do) and
+        ``largest_truncated_probability`` of all starts and goals.
 
     Raises:
         LayoutError: A station the task needs is missing or cannot be reached.
     """
     task = task or soup_task()
-    settings = _settings(prefix, beta, c, ties, tie_tolerance)
-    people = _people(layout, human, rationality, horizon)
-    parts, single, pairs, lost = [], [], [], []
-    for reach in _reaches(layout, task, cell_costs, people, settings):
-        value = reach.weight * math.fsum(s.probability * s.weight * s.value for s in reach.scores)
+    human = human_model(layout, human)
+    parts, single, pairs, truncated = [], [], [], []
+    for part in _stage_goals(layout, task, observer, human, cell_costs):
+        value = part.weight * math.fsum(s.probability * s.weight * s.value for s in part.scores)
         parts.append(value)
-        pairs.append(reach.weight)
-        lost.append(reach.lost_mass)
-        if len(reach.goals) == 1:
+        pairs.append(part.weight)
+        truncated.append(part.truncated_probability)
+        if len(part.goals) == 1:
             single.append(value)
     score = math.fsum(parts)
     result = {
@@ -208,12 +200,14 @@ def score_layout(
         "num_sequences": task.num_sequences,
         "num_stages": len(task.stages()),
         "layout_id": layout.layout_id,
-        "human": people.name,
+        "human": human.name,
     }
-    if people.name == "boltzmann":
-        result["rationality"], result["horizon"] = people.rationality, people.horizon
-        result["lost_mass"] = math.fsum(w * x for w, x in zip(pairs, lost, strict=True)) / math.fsum(pairs)
-        result["largest_lost_mass"] = max(lost)
+    if human.name == "boltzmann":
+        result["rationality"], result["horizon"] = human.rationality, human.horizon
+        result["truncated_probability"] = math.fsum(w * x for w, x in zip(pairs, truncated, strict=True)) / math.fsum(
+            pairs
+        )
+        result["largest_truncated_probability"] = max(truncated)
     return result
 
 
@@ -221,30 +215,32 @@ def explain_layout(
     layout: OvercookedLayout,
     task: TaskGraph | None = None,
     *,
-    prefix: PrefixSpec = "mean",
-    beta: float = 1.0,
-    c: float = 1.0,
-    ties: Ties = "expected",
-    tie_tolerance: float = 1e-9,
+    observer: ObserverModel = ObserverModel(),
+    human: HumanModel | HumanName = "shortest",
     cell_costs: npt.NDArray[np.float64] | None = None,
-    human: str = "shortest",
-    rationality: float | None = None,
-    horizon: int | None = None,
 ) -> list[dict[str, Any]]:
-    """Which stages, goals and prefixes win or lose the score; arguments as for :func:`score_layout`.
+    """Which stages, goals and prefixes win or lose the score of a kitchen.
+
+    Args:
+        layout: The kitchen.
+        task: The task, over station types; the paper's three soups if None.
+        observer: How the observer infers goals, which prefixes count, and what errors cost.
+        human: How people move: a model, or ``"shortest"`` or ``"boltzmann"`` with its default settings.
+        cell_costs: ``(H, W)`` cost of stepping on each cell, for people and observer alike; None for 1.
 
     Returns:
         A row for every stage and goal, the greatest loss first: ``start``, ``goals`` (valid), ``goal`` (true),
-        ``weight`` (expected number of such stages), ``score`` (expected legibility of the reach), ``contribution``
-        (weight times score; contributions sum to the layout's score), ``ties_with`` (probability that each other goal
-        is at the top, averaged over the weighted prefixes: together with the true one, or instead of it where people
-        leave the shortest ways), and ``prefixes``: a row for every step ``t`` with the mean ``value`` of Eq. 2, its
-        ``weight`` and ``ties_with`` at that step.
+        ``weight`` (expected number of such stages), ``score`` (expected legibility of its trajectories),
+        ``contribution`` (weight times score; contributions sum to the layout's score), ``ties_with`` (probability that
+        each other goal is at the top, averaged over the weighted prefixes: together with the true one, or instead of
+        it where people leave the shortest paths), and ``prefixes``: a row for every step ``t`` with the mean ``value``
+        of Eq. 2, its ``weight`` and ``ties_with`` at that step.
+
+    Raises:
+        LayoutError: A station the task needs is missing or cannot be reached.
     """
     rows = []
-    settings = _settings(prefix, beta, c, ties, tie_tolerance)
-    people = _people(layout, human, rationality, horizon)
-    for start, goals, goal, weight, scores, _ in _reaches(layout, task or soup_task(), cell_costs, people, settings):
+    for start, goals, goal, weight, scores, _ in _stage_goals(layout, task or soup_task(), observer, human, cell_costs):
         score = math.fsum(s.probability * s.weight * s.value for s in scores)
         rows.append(
             {
@@ -291,26 +287,30 @@ def ambiguity(
     layout: OvercookedLayout,
     task: TaskGraph | None = None,
     *,
-    prefix: PrefixSpec = "mean",
-    beta: float = 1.0,
-    c: float = 1.0,
-    ties: Ties = "expected",
-    tie_tolerance: float = 1e-9,
+    observer: ObserverModel = ObserverModel(),
+    human: HumanModel | HumanName = "shortest",
     cell_costs: npt.NDArray[np.float64] | None = None,
-    human: str = "shortest",
-    rationality: float | None = None,
-    horizon: int | None = None,
 ) -> npt.NDArray[np.float64]:
-    """``(H, W)`` probability that an observer who sees the person on a cell would name a wrong goal; NaN off all walks.
+    """How often an observer who sees the person on a cell would predict a wrong goal.
 
-    Averaged over all walks of the task that pass the cell, each as often as it happens; arguments as for
-    :func:`score_layout`.
+    Averaged over all trajectories of the task that pass the cell, each as often as it happens.
+
+    Args:
+        layout: The kitchen.
+        task: The task, over station types; the paper's three soups if None.
+        observer: How the observer infers goals, which prefixes count, and what errors cost.
+        human: How people move: a model, or ``"shortest"`` or ``"boltzmann"`` with its default settings.
+        cell_costs: ``(H, W)`` cost of stepping on each cell, for people and observer alike; None for 1.
+
+    Returns:
+        ``(H, W)`` probabilities; NaN on cells that no trajectory passes.
+
+    Raises:
+        LayoutError: A station the task needs is missing or cannot be reached.
     """
     wrong = np.zeros(layout.shape)
     visits = np.zeros(layout.shape)
-    settings = _settings(prefix, beta, c, ties, tie_tolerance)
-    people = _people(layout, human, rationality, horizon)
-    for _, goals, goal, weight, scores, _ in _reaches(layout, task or soup_task(), cell_costs, people, settings):
+    for _, goals, goal, weight, scores, _ in _stage_goals(layout, task or soup_task(), observer, human, cell_costs):
         for s in scores:
             cell = cast("tuple[int, int]", s.node)
             visits[cell] += weight / len(goals) * s.probability

@@ -18,7 +18,7 @@ __all__ = ["Genomes", "Geometry", "connected", "place_obstacles", "place_station
 
 
 class Geometry(NamedTuple):
-    """Where things may stand; ``N`` stations, ``M`` slots, ``I`` inner cells, flat cell indices.
+    """Where stations and obstacles may stand; ``N`` stations, ``M`` slots, ``I`` inner cells, flat cell indices.
 
     Attributes:
         stride: Columns of the grid.

@@ -1,4 +1,4 @@
-"""From a task and parameters to the tables the score kernel reads."""
+"""From a task and an observer to the tables of the score kernels."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.errors import TaskError
-from legible_envs.legibility import PrefixSpec, Ties, prefix_weights
+from legible_envs.legibility import prefix_weights
+from legible_envs.observer import ObserverModel, PrefixSpec, Ties
 from legible_envs.overcooked.scoring.exact_kernels import ScoreTables
 from legible_envs.tasks import TaskGraph
 
@@ -17,28 +18,14 @@ __all__ = ["make_tables"]
 MAX_GOALS = 12
 
 
-def make_tables(
-    task: TaskGraph,
-    stations: Sequence[str],
-    *,
-    num_floor: int,
-    prefix: PrefixSpec,
-    beta: float,
-    c: float,
-    ties: Ties,
-    tie_tolerance: float,
-) -> ScoreTables:
+def make_tables(task: TaskGraph, stations: Sequence[str], observer: ObserverModel, *, num_floor: int) -> ScoreTables:
     """Build the tables of :class:`~legible_envs.overcooked.scoring.exact_kernels.ScoreTables`.
 
     Args:
         task: The task; its places are station types.
         stations: Station types in genome order.
+        observer: How the observer infers goals, which prefixes count, and what errors cost.
         num_floor: Largest possible number of floor cells, which bounds all distances.
-        prefix: Which prefixes count.
-        beta: Rationality per step.
-        c: Cost per step observed in doubt.
-        ties: ``"expected"`` or ``"strict"``.
-        tie_tolerance: Slacks up to this count as ties.
 
     Raises:
         TaskError: The task names a place that is no station, or has more than 12 goals.
@@ -61,13 +48,13 @@ def make_tables(
         starts=np.array([stations.index(s) for s in starts], dtype=np.int64),
         goals=np.array([stations.index(g) for g in goals], dtype=np.int64),
         stage_weights=weights,
-        tie_penalties=_tie_penalties(weights, len(goals), ties),
-        discounts=np.exp(-beta * np.arange(2 * num_floor + 3)),
-        prefix_weights=_prefix_table(prefix, num_floor + 2),
+        tie_penalties=_tie_penalties(weights, len(goals), observer.ties),
+        discounts=np.exp(-observer.beta * np.arange(2 * num_floor + 3)),
+        prefix_weights=_prefix_table(observer.prefix, num_floor + 2),
         legs=legs,
-        c=float(c),
-        beta=float(beta),
-        tie_tolerance=float(tie_tolerance),
+        c=observer.c / observer.unit,
+        beta=observer.beta,
+        tie_tolerance=observer.tie_tolerance,
     )
 
 

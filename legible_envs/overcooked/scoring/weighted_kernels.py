@@ -1,6 +1,6 @@
-"""Kernels of the exact legibility score where cells differ in cost, such as costs learned from people.
+"""Kernels of the exact legibility score where cells differ in cost, such as costs learned from recorded trajectories.
 
-Optimal walks may then differ in their number of steps, so they are counted by steps taken and steps left.
+Optimal trajectories may then differ in their number of steps, so they are counted by steps taken and steps left.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def costs_to(
     order: npt.NDArray[np.int64],
     done: npt.NDArray[np.bool_],
 ) -> int:
-    """Cost of the best way from every cell to one floor cell and on into its station (Dijkstra).
+    """Cost-to-go from every cell to one floor cell and on into its station (Dijkstra).
 
     Grids are small, so the next cell is found by looking through all of them.
 
@@ -36,7 +36,7 @@ def costs_to(
         stride: Columns of the grid.
         costs: ``[n]`` cost of stepping on each cell.
         target: Index of the station's access cell.
-        best: ``[n]`` output, ``inf`` where there is no way; the last step into the station costs 1.
+        best: ``[n]`` output, ``inf`` where there is no path; the last step into the station costs 1.
         order: ``[n]`` output: the cells reached, nearest first.
         done: ``[n]`` scratch.
 
@@ -64,7 +64,7 @@ def costs_to(
 
 
 @kernel
-def count_walks(
+def count_trajectories(
     stride: int,
     costs: Floats,
     start: int,
@@ -75,10 +75,10 @@ def count_walks(
     departing: Floats,
     arriving: Floats,
 ) -> None:
-    """Count optimal walks from ``start``, by steps, to and from every cell.
+    """Count optimal trajectories from ``start``, by steps, to and from every cell.
 
     ``best``, ``order`` and ``reached`` are those of :func:`costs_to`; ``departing [n, T]`` and ``arriving [n, T]``
-    receive the number of walks ``start -> cell`` of ``t`` steps (the first step enters ``start``) and
+    receive the number of trajectories ``start -> cell`` of ``t`` steps (the first step enters ``start``) and
     ``cell -> station`` of ``r`` steps.
     """
     longest = departing.shape[1]
@@ -103,16 +103,16 @@ def count_walks(
 
 
 @kernel
-def stage_value(slack: Floats, goal: int, goals: int, step: int, tables: ScoreTables, strict: bool) -> float:
-    """Eq. 2 of one prefix for the bit set of valid ``goals``; ``slack [K]`` is relative to the true goal."""
+def stage_value(excess: Floats, goal: int, goals: int, step: int, tables: ScoreTables, strict: bool) -> float:
+    """Eq. 2 of one prefix for the bit set of valid ``goals``; ``excess [K]`` is relative to the true goal."""
     tied = 0
     total = 0.0
     second = 0.0
-    for g in range(len(slack)):
+    for g in range(len(excess)):
         if goals & (1 << g):
-            p = np.exp(-tables.beta * slack[g])
+            p = np.exp(-tables.beta * excess[g])
             total += p
-            tied += slack[g] <= tables.tie_tolerance
+            tied += excess[g] <= tables.tie_tolerance
             if g != goal:
                 second = max(second, p)
     if tied > 1:
@@ -138,33 +138,33 @@ def score_cells_weighted(
     done = np.empty(n, dtype=np.bool_)
     departing = np.empty((n, longest))
     arriving = np.empty((n, longest))
-    slack = np.empty(num_goals)
+    excess = np.empty(num_goals)
     for g in range(num_goals):
         reached[g] = costs_to(floor, stride, costs, access[tables.goals[g]], best[g], order[g], done)
     total = 0.0
     for s in range(len(tables.starts)):
         start = access[tables.starts[s]]
         for goal in range(num_goals):
-            count_walks(
+            count_trajectories(
                 stride, costs, start, best[goal], order[goal], reached[goal], tables.tie_tolerance, departing, arriving
             )
-            walks = arriving[start].sum()
+            count = arriving[start].sum()
             for i in range(reached[goal]):
                 cell = order[goal, i]
                 for g in range(num_goals):
-                    slack[g] = best[g, cell] - best[g, start] - (best[goal, cell] - best[goal, start])
+                    excess[g] = best[g, cell] - best[g, start] - (best[goal, cell] - best[goal, start])
                 for t in range(1, longest):
                     if departing[cell, t] == 0.0:
                         continue
                     share = 0.0
                     for r in range(1, longest - t):
-                        share += departing[cell, t] * arriving[cell, r] / walks * tables.prefix_weights[t + r, t]
+                        share += departing[cell, t] * arriving[cell, r] / count * tables.prefix_weights[t + r, t]
                     if share == 0.0:
                         continue
                     for goals in range(tables.stage_weights.shape[1]):
                         weight = tables.stage_weights[s, goals]
                         if weight > 0.0 and goals & (1 << goal):
-                            total += weight * share * stage_value(slack, goal, goals, t, tables, strict)
+                            total += weight * share * stage_value(excess, goal, goals, t, tables, strict)
     return total
 
 

@@ -1,12 +1,12 @@
 """The legibility of a table without obstacles, and continuous measures of it, with gradients by PyTorch.
 
 Without obstacles every shortest path is a straight line, and Eq. 1 to 3 are compositions of distances, exponentials,
-quotients and minima. What :class:`.TabletopScorer` computes is therefore *piecewise*
-smooth in the centres of the objects. It has a kink wherever two goals are equally likely second choices (the margin of
-Eq. 2 goes over to the other), and it jumps, by what was observed in doubt, where another goal ties with the true one:
-objects in one place, or one straight behind another as seen from the start. On kinks the gradient is one of the slopes
-or a mean of them; at ties it is that of the value there. Gradients know nothing of a layout's rules: objects may
-overlap or leave the region, and whoever follows a gradient must look.
+quotients and minima. What :class:`.TabletopScorer` computes is therefore *piecewise* smooth in the centres of the
+objects. It has a kink wherever two goals are equally likely second choices (the margin of Eq. 2 goes over to the
+other). It jumps where another goal ties with the true one (objects in one place, or one straight behind another as seen
+from the start), because errors cost what was observed. On kinks the gradient is one of the slopes or a mean of them; at
+ties it is that of the value there. Gradients know nothing of a layout's rules: a step along one may make objects
+overlap or leave the region, so check the result.
 """
 
 from __future__ import annotations
@@ -178,9 +178,9 @@ class DifferentiableTable:
         goals = points[:, tables.targets[tables.goal_target[first:last]]]
         start, fractions = points[:, tables.group_start[q]], self._like(tables.fractions, points)
         num_goals, num_points = last - first, (last - first) * len(fractions)
-        ways = goals - start[:, None]
-        lengths = self._norm(ways)
-        at = (start[:, None, None] + fractions[:, None] * ways[:, :, None]).flatten(1, 2)
+        lines = goals - start[:, None]
+        lengths = self._norm(lines)
+        at = (start[:, None, None] + fractions[:, None] * lines[:, :, None]).flatten(1, 2)
         seen = (fractions * lengths[:, :, None]).flatten(1, 2)
         own = self._like(np.repeat(np.eye(num_goals), len(fractions), axis=0), points)
         excess = self._norm(goals[:, None] - at[:, :, None]) + seen[:, :, None] - lengths[:, None]

@@ -126,7 +126,7 @@ class DesignRules:
         """The layout of a ``(d,)`` genome.
 
         Raises:
-            LayoutError: It breaks a rule; the message names gene or thing, rule and numbers.
+            LayoutError: It breaks a rule; the message names gene or object, rule and numbers.
         """
         layout = self.task.layout.with_genome(genome, self.max_obstacles, self.obstacle_size)
         genome = np.asarray(genome, dtype=np.float64)
@@ -192,7 +192,7 @@ class DesignRules:
         Raises:
             LayoutError: ``rule`` is one of :meth:`~legible_envs.tabletop.layout.TabletopLayout.validate`, or
                 ``"object-spacing"``, ``"obstacle-off-table"``, ``"start-clearance"``, ``"object-clearance"``,
-                ``"slot"`` (an obstacle over a place of the desired configuration, or no way there),
+                ``"slot"`` (an obstacle over a place of the desired configuration, or no path there),
                 ``"obstacle-apart"`` or ``"detour"``.
         """
         layout.validate()
@@ -231,8 +231,8 @@ class DesignRules:
                 raise LayoutError(
                     f"{what} is {distance:.4g} m from {name} at {at}; at least {clearance:g} m are needed", rule=rule
                 )
-        for name, at, thing in self.slots:
-            if rectangles_overlap(corners, rectangle(*at, thing.angle, *thing.size)):
+        for name, at, placed in self.slots:
+            if rectangles_overlap(corners, rectangle(*at, placed.angle, *placed.size)):
                 raise LayoutError(f"{what} lies over the slot of {name} at {at}", rule="slot")
         for other_number, other in enumerate(layout.obstacles[: number - 1], 1):
             if self.obstacles_apart and not _apart(corners, other.corners):
@@ -254,7 +254,7 @@ class DesignRules:
             length = lengths[start][layout.index(goal)]
             if length > (self.max_detour + EDGE) * straight:
                 raise LayoutError(
-                    f"the way from {start} to {goal} is {length / straight:.3g} x its straight line; max_detour is "
+                    f"the path from {start} to {goal} is {length / straight:.3g} x its straight line; max_detour is "
                     f"{self.max_detour:g}",
                     rule="detour",
                 )

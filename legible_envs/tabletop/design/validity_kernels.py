@@ -115,7 +115,7 @@ def in_bounds(genome: Floats, rules: Rules) -> bool:
 
 @kernel
 def place(genome: Floats, rules: Rules, room: Room) -> int:
-    """Write where things lie to ``room``; returns the number of obstacles."""
+    """Write where objects and obstacles lie to ``room``; returns the number of obstacles."""
     points, boxes = room.points, room.boxes
     for i in range(len(rules.movable)):
         points[rules.movable[i], 0] = genome[2 * i]
@@ -228,7 +228,7 @@ def obstacle_allowed(rules: Rules, points: Floats, boxes: Floats, i: int) -> boo
 
 @kernel
 def know_ways(rules: Rules, room: Room, grown: Floats) -> int:
-    """Prepare ``way``: corners, and nothing known of any object yet; returns how many corners there are."""
+    """Prepare :func:`path_length`: corners, and nothing known of any object yet; returns how many corners there are."""
     count = keep_corners(grown, rules.size, room.corners)
     corners_between(grown, room.corners, count, room.between)
     room.is_known[:] = False
@@ -236,7 +236,7 @@ def know_ways(rules: Rules, room: Room, grown: Floats) -> int:
 
 
 @kernel
-def way(room: Room, grown: Floats, count: int, x: float, y: float, goal: int) -> float:
+def path_length(room: Room, grown: Floats, count: int, x: float, y: float, goal: int) -> float:
     """Length of the shortest path from a free point to an object; inf where there is none."""
     points = room.points
     if clear(grown, x, y, points[goal, 0], points[goal, 1]):
@@ -253,12 +253,12 @@ def detour(room: Room, grown: Floats, count: int, start: int, goal: int) -> floa
     """Shortest path of a reach over its straight line."""
     x, y = room.points[start, 0], room.points[start, 1]
     straight = norm(room.points[goal, 0] - x, room.points[goal, 1] - y)
-    return way(room, grown, count, x, y, goal) / straight if straight > 0.0 else 1.0
+    return path_length(room, grown, count, x, y, goal) / straight if straight > 0.0 else 1.0
 
 
 @kernel
 def ways_allowed(rules: Rules, room: Room, num_obstacles: int) -> bool:
-    """Whether a hand may be at all points, gets everywhere, and no reach is a long way round."""
+    """Whether a hand may be at all points, gets everywhere, and no reach is a long detour."""
     grown, points, n = room.grown[:num_obstacles], room.points, len(rules.shapes)
     for i in range(len(points)):
         if not is_free(grown, points[i, 0], points[i, 1], rules.size):
@@ -273,10 +273,10 @@ def ways_allowed(rules: Rules, room: Room, num_obstacles: int) -> bool:
             return False
     for goal in range(n):
         for i in range(n, len(points)):
-            if not way(room, grown, count, points[i, 0], points[i, 1], goal) < np.inf:
+            if not path_length(room, grown, count, points[i, 0], points[i, 1], goal) < np.inf:
                 return False
     for i in range(len(rules.slots)):
-        if not way(room, grown, count, rules.slots[i, 0], rules.slots[i, 1], 0) < np.inf:
+        if not path_length(room, grown, count, rules.slots[i, 0], rules.slots[i, 1], 0) < np.inf:
             return False
     return True
 

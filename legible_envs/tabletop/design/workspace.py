@@ -1,4 +1,4 @@
-"""The design of tables: which are allowed, how they vary, and what they score."""
+"""The design of tables: which are allowed, how they vary, and how they score."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.errors import LayoutError
-from legible_envs.legibility import Ties
+from legible_envs.observer import ObserverModel, Ties
 from legible_envs.rollouts.trajectory import Trajectory
+from legible_envs.support.validation import check_finite
 from legible_envs.tabletop.design import genome_kernels as kernels
 from legible_envs.tabletop.design import measures
 from legible_envs.tabletop.design import validity_kernels as validity
 from legible_envs.tabletop.design.rules import DesignRules
 from legible_envs.tabletop.layout import MAX_OBSTACLES, TabletopLayout
 from legible_envs.tabletop.objects import OBSTACLE_SIZE, numbers
-from legible_envs.tabletop.scoring.explanation import explain_table
+from legible_envs.tabletop.scoring.explanation import summarise
 from legible_envs.tabletop.scoring.scorer import TableScores, TabletopScorer
 from legible_envs.tabletop.task import TabletopTask, task_names
 from legible_envs.workspace import Array, ObjectiveName, Workspace, as_batch, as_single, check_choice
 
-__all__ = ["Condition", "TabletopWorkspace"]
+__all__ = ["DesignMode", "TabletopWorkspace"]
 
-Condition = Literal["both", "placement", "obstacles"]
+DesignMode = Literal["both", "placement", "obstacles"]
 SecondMeasure = Literal["order", "mean x"]
-CONDITIONS: tuple[Condition, ...] = ("both", "placement", "obstacles")
 MAX_SAMPLE_TRIES = 2_000_000
 CELL = 0.01
 WIDE_CELL = 0.02
@@ -67,8 +67,8 @@ class TabletopWorkspace(Workspace):
         obstacles_on_table: Whether obstacles must lie wholly on the table.
         obstacles_apart: Whether obstacles may neither cross nor touch one another.
         obstacle_cost: What an objective loses for every obstacle.
-        beta: Rationality per metre (Eq. 1).
-        c: Cost per ``unit`` observed in doubt (Eq. 2).
+        beta: Rationality per metre that the observer assumes (Eq. 1).
+        c: Cost per ``unit`` observed while the predicted goal is wrong (Eq. 2).
         unit: Metres.
         prefix: ``"mean"`` (ten arc-length midpoints of the reach), or observed fractions in (0, 1].
         ties: ``"expected"`` (uniform tie-breaking) or ``"strict"`` (a tie counts as wrong).
@@ -103,7 +103,7 @@ class TabletopWorkspace(Workspace):
     def __init__(
         self,
         task: TabletopTask | Mapping[str, Any] | str = "columns",
-        condition: Condition = "both",
+        condition: DesignMode = "both",
         *,
         max_obstacles: int = MAX_OBSTACLES,
         obstacle_size: Sequence[float] = OBSTACLE_SIZE,
@@ -130,15 +130,10 @@ class TabletopWorkspace(Workspace):
             task == self.task.name or _as_task(self.task.name) == self.task
         )
         self._task_config = self.task.name if is_shipped else self.task.to_dict()
-        self.condition: Condition = check_choice("condition", condition, CONDITIONS)
+        self.condition: DesignMode = check_choice("condition", condition, get_args(DesignMode))
         self.scorer = TabletopScorer(
             self.task,
-            beta=beta,
-            c=c,
-            unit=unit,
-            prefix=prefix,
-            ties=ties,
-            tie_tolerance=tie_tolerance,
+            observer=ObserverModel.in_metres(beta, c, prefix, ties, tie_tolerance, unit),
             max_obstacles=max_obstacles,
             obstacle_size=numbers(obstacle_size, 2, "obstacle_size", positive=True),  # type: ignore[arg-type]
         )
@@ -148,11 +143,8 @@ class TabletopWorkspace(Workspace):
             raise ValueError(f"max_detour must be a finite number >= 1 or None, got {max_detour!r}")
         if not 0 < step_sd < np.inf:
             raise ValueError(f"step_sd must be a positive number of metres, got {step_sd!r}")
-        self.obstacle_cost = _length("obstacle_cost", obstacle_cost)
+        self.obstacle_cost = check_finite("obstacle_cost", obstacle_cost, minimum=0.0)
         self.step_sd = float(step_sd)
-        self.ties, self.tie_tolerance = ties, float(tie_tolerance)
-        self.beta, self.c, self.unit = float(beta), float(c), float(unit)
-        self._mean_prefix = isinstance(prefix, str)
         self.start_from = TabletopLayout.from_dict(start_from) if isinstance(start_from, Mapping) else start_from
         if not isinstance(self.start_from, TabletopLayout | None):
             raise LayoutError(f"start_from must be a TabletopLayout or its to_dict(), got {start_from!r}", rule="type")
@@ -164,9 +156,9 @@ class TabletopWorkspace(Workspace):
             max_obstacles=max_obstacles,
             obstacle_size=self.scorer.obstacle_size,
             max_detour=max_detour,
-            start_clearance=_length("start_clearance", start_clearance),
-            object_clearance=_length("object_clearance", object_clearance),
-            object_spacing=_length("object_spacing", object_spacing),
+            start_clearance=check_finite("start_clearance", start_clearance, minimum=0.0),
+            object_clearance=check_finite("object_clearance", object_clearance, minimum=0.0),
+            object_spacing=check_finite("object_spacing", object_spacing, minimum=0.0),
             obstacles_on_table=bool(obstacles_on_table),
             obstacles_apart=bool(obstacles_apart),
         )
@@ -198,6 +190,11 @@ class TabletopWorkspace(Workspace):
         return names
 
     @property
+    def observer(self) -> ObserverModel:
+        """How the observer infers goals, which prefixes count, and what errors cost, in metres."""
+        return self.scorer.observer
+
+    @property
     def baseline(self) -> TabletopLayout:
         """The sorted, undesigned arrangement, without obstacles."""
         return self.task.layout
@@ -220,7 +217,7 @@ class TabletopWorkspace(Workspace):
         return self.rules.upper_bounds
 
     def decode(self, genome: npt.ArrayLike) -> TabletopLayout:
-        """The layout of one ``(d,)`` genome; a :class:`LayoutError` names thing, rule and numbers."""
+        """The layout of one ``(d,)`` genome; a :class:`LayoutError` names object, rule and numbers."""
         return self.rules.decode(as_single(genome, self.genome_size)[0])
 
     def encode(self, layout: TabletopLayout) -> Array:
@@ -258,9 +255,8 @@ class TabletopWorkspace(Workspace):
     def perturb(self, genomes: npt.NDArray[Any], k: int, rng: np.random.Generator, phase: int = 0) -> Array:
         """``(n * k, d)`` valid children of ``(n, d)`` valid parents, grouped by parent.
 
-        Objects are what varies in phase 0, obstacles in phase 1 (under ``"obstacles"`` in phase 0, the only one); how
-        is said in :func:`.perturb_genomes`. A parent that has no valid child repeats
-        itself.
+        Objects vary in phase 0, obstacles in phase 1 (under ``"obstacles"`` in phase 0, the only one);
+        :func:`.perturb_genomes` documents the changes. A parent that has no valid child repeats itself.
         """
         check_choice("phase", phase, range(self.phases))
         parents = self._as_float(genomes)
@@ -300,9 +296,9 @@ class TabletopWorkspace(Workspace):
         batch = self._as_float(genomes)
         valid = self.valid(batch)
         if valid.all():
-            return self.scorer.genomes(batch)
+            return self.scorer.score_genomes(batch)
         scores = np.full((4, len(batch)), np.nan)
-        scores[:, valid] = self.scorer.genomes(batch[valid])
+        scores[:, valid] = self.scorer.score_genomes(batch[valid])
         return TableScores(*scores)
 
     def scores(self, genomes: npt.NDArray[Any]) -> tuple[Array, Array]:
@@ -416,41 +412,31 @@ class TabletopWorkspace(Workspace):
         layout = self._one(genome)
         row = layout.to_genome(self.rules.max_obstacles, self.rules.obstacle_size)[None]
         legibility, distance, mean_detour, max_detour = (float(x[0]) for x in self.table_scores(row))
-        # Where one goal is valid, p(2) = 0 and every prefix has the margin 1.
-        single = math.fsum(stage.weight for stage in self.task.graph.stages() if len(stage.goals) == 1)
+        scores = summarise(
+            layout,
+            self.task.graph,
+            score=legibility,
+            distance=distance,
+            mean_detour=mean_detour,
+            max_detour=max_detour,
+        )
         stays = np.array([not o.movable for o in layout.objects])
         x_order = sorted(self.ranked, key=lambda name: (*layout.place(name), self.ranked.index(name)))
         return {
             "score": legibility,
             "objective": legibility - float(self.penalty(row)[0]),
-            "distance": distance,
-            "normalised": legibility / self.scorer.best_possible,
-            "single_goal_score": single,
-            "single_goal_share": single / legibility if legibility else math.nan,
-            "mean_detour": mean_detour,
-            "max_detour": max_detour,
-            "num_obstacles": len(layout.obstacles),
+            **scores,
             "least_distance": float(measures.least_distances(layout.centres[None], stays)[0]),
             "order": x_order,
-            "candidate_set": "task",
-            "num_sequences": self.task.graph.num_sequences,
-            "num_stages": len(self.task.graph.stages()),
-            "layout_id": layout.layout_id,
             "condition": self.condition,
         }
 
     def explain(self, genome: npt.ArrayLike | TabletopLayout) -> list[dict[str, Any]]:
-        """Where the table wins and loses its score; see :func:`.explain_table`."""
-        return explain_table(
-            self._one(genome),
-            self.task.graph,
-            fractions=self.scorer.tables.fractions.tolist(),
-            beta=self.beta,
-            c=self.c,
-            unit=self.unit,
-            ties=self.ties,
-            tie_tolerance=self.tie_tolerance,
-        )
+        """Where the table wins and loses its score: a row per stage and goal, the greatest loss first.
+
+        See :func:`~legible_envs.tabletop.scoring.explanation.explain_layout` for what a row holds.
+        """
+        return self.scorer.explain_layout(self._one(genome))
 
     def simulate(
         self,
@@ -459,11 +445,11 @@ class TabletopWorkspace(Workspace):
         rng: np.random.Generator,
         **settings: Any,
     ) -> list[Trajectory]:
-        """Reaches of simulated people who each do the task at one table.
+        """Trajectories of simulated participants who each do the task at one table.
 
         Args:
             genome: ``(d,)``, or the table.
-            participants: Number of people.
+            participants: Number of participants.
             rng: Source of all randomness.
             **settings: See :func:`legible_envs.tabletop.humans.simulate_participants`.
         """
@@ -475,18 +461,19 @@ class TabletopWorkspace(Workspace):
 
     def to_config(self) -> dict[str, Any]:
         """Settings as JSON-ready data; ``make_workspace`` and the constructor read them back."""
+        observer = self.observer
         return {
             "workspace": self.name,
             "task": self._task_config,
             "condition": self.condition,
             **self.rules.settings(),
             "obstacle_cost": self.obstacle_cost,
-            "beta": self.beta,
-            "c": self.c,
-            "unit": self.unit,
-            "prefix": "mean" if self._mean_prefix else self.scorer.tables.fractions.tolist(),
-            "ties": self.ties,
-            "tie_tolerance": self.tie_tolerance,
+            "beta": observer.beta,
+            "c": observer.c,
+            "unit": observer.unit,
+            "prefix": observer.prefix if isinstance(observer.prefix, str) else sorted(observer.prefix),
+            "ties": observer.ties,
+            "tie_tolerance": observer.tie_tolerance,
             "ranked": list(self.ranked),
             "second_measure": self.second_measure,
             "step_sd": self.step_sd,
@@ -505,10 +492,3 @@ def _as_task(task: TabletopTask | Mapping[str, Any] | str) -> TabletopTask:
     if isinstance(task, Mapping):
         return TabletopTask.from_dict(task)
     return TabletopTask.from_yaml(task) if task.endswith((".yaml", ".yml")) else TabletopTask.named(task)
-
-
-def _length(name: str, value: float) -> float:
-    """A finite number that is at least 0."""
-    if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not 0 <= float(value) < np.inf:
-        raise ValueError(f"{name} must be a finite number >= 0, got {value!r}")
-    return float(value)

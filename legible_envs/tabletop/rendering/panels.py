@@ -84,7 +84,7 @@ def draw_panels(
 
 
 def _caption(layout: TabletopLayout, task: TabletopTask, scorer: TabletopScorer | None) -> str:
-    scores = (scorer or _default_scorer(task)).layout(layout)
+    scores = (scorer or _default_scorer(task)).score_layouts([layout])
     return (
         f"legibility {scores.legibility[0]:.2f}\n".replace("-", "\u2212")
         + f"mean detour {scores.mean_detour[0]:.2f} ×, {scores.distance[0]:.2f} m in all"

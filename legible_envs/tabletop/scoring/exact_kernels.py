@@ -3,7 +3,7 @@
 The definition is :mod:`legible_envs.legibility`; on a table a reach follows the shortest path among grown obstacles,
 is observed at fixed fractions of its length, and costs are metres. Reaches that are ever candidates together and leave
 from one start form a *group*; all stages of a group share its paths, points and distances. On its own shortest path
-the true goal always has the least excess cost, so an observer is wrong only where goals tie.
+the true goal always has the least excess cost, so the observer is wrong only where goals tie.
 """
 
 from __future__ import annotations
@@ -51,9 +51,9 @@ class ReachTables(NamedTuple):
         leg_weight: ``[L]`` expected number of such legs.
         fractions: ``[K]`` observed shares of a reach.
         beta: Rationality per metre.
-        penalty: Cost of a metre observed in doubt.
+        penalty: Cost of a metre observed while the prediction is wrong.
         tie_tolerance: Excess costs up to this tie.
-        strict: Whether a tie counts as wrong rather than as a fair guess.
+        strict: Whether a tie counts as wrong rather than as a uniform guess.
     """
 
     targets: Ints
@@ -86,7 +86,7 @@ class Scratch(NamedTuple):
     observed: Floats
     excess: Floats
     evidence: Floats
-    slack: Floats
+    blocking: Floats
     most: Floats
     box_u: Floats
     box_v: Floats
@@ -94,7 +94,7 @@ class Scratch(NamedTuple):
     near_x: Floats
     near_y: Floats
     away: Floats
-    ways: Floats
+    detours: Floats
     value: Floats
     total: Floats
     sums: Floats
@@ -172,9 +172,9 @@ def straight_excess(x: Floats, y: Floats, seen: Floats, goal: Floats, optimal: f
 def find_blocked(
     boxes: Floats, tables: ReachTables, first: int, num_goals: int, num_points: int, scratch: Scratch
 ) -> None:
-    """Write to ``scratch.slack [G, P]`` a number >= 0 where a box is in the straight way from point to goal.
+    """Write to ``scratch.blocking [G, P]`` a number >= 0 where a box lies across the straight line from point to goal.
 
-    A reach's own way is known and never counts. ``scratch.most [P]`` is the greatest number of each point.
+    A reach's own path is known and never counts. ``scratch.most [P]`` is the greatest number of each point.
     """
     per_goal = len(tables.fractions)
     x, y, most = scratch.x[:num_points], scratch.y[:num_points], scratch.most[:num_points]
@@ -182,13 +182,13 @@ def find_blocked(
     for i in range(len(boxes)):
         into_box(boxes[i], x, y, scratch.box_u[i, :num_points], scratch.box_v[i, :num_points])
     for g in range(num_goals):
-        slack = scratch.slack[g, :num_points]
-        slack[:] = -1.0
+        blocking = scratch.blocking[g, :num_points]
+        blocking[:] = -1.0
         goal = scratch.target_points[tables.goal_target[first + g]]
         for i in range(len(boxes)):
-            block(boxes[i], scratch.box_u[i, :num_points], scratch.box_v[i, :num_points], goal[0], goal[1], slack)
-        slack[g * per_goal : (g + 1) * per_goal] = -1.0
-        raise_to(slack, most)
+            block(boxes[i], scratch.box_u[i, :num_points], scratch.box_v[i, :num_points], goal[0], goal[1], blocking)
+        blocking[g * per_goal : (g + 1) * per_goal] = -1.0
+        raise_to(blocking, most)
 
 
 @kernel
@@ -212,20 +212,20 @@ def gather_blocked(num_boxes: int, num_points: int, scratch: Scratch) -> int:
 
 
 @kernel
-def reach_corner(x: Floats, y: Floats, corner: Floats, slack: Floats, away: Floats) -> None:
-    """``away`` = distance of each point to a corner, inf where ``slack`` says that a box is in the way."""
+def reach_corner(x: Floats, y: Floats, corner: Floats, blocking: Floats, away: Floats) -> None:
+    """``away`` = distance of each point to a corner, inf where ``blocking`` says that a box lies between."""
     for p in range(len(x)):
         dx, dy = corner[0] - x[p], corner[1] - y[p]
         distance = np.sqrt(dx * dx + dy * dy)
-        away[p] = distance if slack[p] < 0.0 else np.inf
+        away[p] = distance if blocking[p] < 0.0 else np.inf
 
 
 @kernel
-def shorten(away: Floats, rest: float, ways: Floats) -> None:
-    """``ways = min(ways, away + rest)``."""
+def shorten(away: Floats, rest: float, detours: Floats) -> None:
+    """``detours = min(detours, away + rest)``."""
     for p in range(len(away)):
-        way = away[p] + rest
-        ways[p] = way if way < ways[p] else ways[p]
+        length = away[p] + rest
+        detours[p] = length if length < detours[p] else detours[p]
 
 
 @kernel
@@ -239,7 +239,7 @@ def detour_excess(
     optimal: Floats,
     scratch: Scratch,
 ) -> None:
-    """Replace the excess of blocked pairs of point and goal by that of the best way round a corner.
+    """Replace the excess of blocked pairs of point and goal by that of the shortest path round a corner.
 
     All corners are tried for all blocked points, in loops without branches: that is faster than to look for the few
     that matter.
@@ -248,22 +248,22 @@ def detour_excess(
     n = gather_blocked(len(boxes), num_points, scratch)
     if n == 0:
         return
-    x, y, slack, away = scratch.near_x[:n], scratch.near_y[:n], scratch.most[:n], scratch.away[:n]
+    x, y, blocking, away = scratch.near_x[:n], scratch.near_y[:n], scratch.most[:n], scratch.away[:n]
     for g in range(num_goals):
-        scratch.ways[g, :n] = np.inf
+        scratch.detours[g, :n] = np.inf
     for c in range(count):
         corner = scratch.corners[c]
-        slack[:] = -1.0
+        blocking[:] = -1.0
         for i in range(len(boxes)):
-            block(boxes[i], scratch.box_u[i, :n], scratch.box_v[i, :n], corner[0], corner[1], slack)
-        reach_corner(x, y, corner, slack, away)
+            block(boxes[i], scratch.box_u[i, :n], scratch.box_v[i, :n], corner[0], corner[1], blocking)
+        reach_corner(x, y, corner, blocking, away)
         for g in range(num_goals):
-            shorten(away, scratch.lengths[tables.goal_target[first + g], c], scratch.ways[g, :n])
+            shorten(away, scratch.lengths[tables.goal_target[first + g], c], scratch.detours[g, :n])
     for g in range(num_goals):
         for k in range(n):
             p = scratch.blocked[k]
-            if scratch.slack[g, p] >= 0.0:
-                scratch.excess[g, p] = scratch.ways[g, k] + (scratch.observed[p] - optimal[g])
+            if scratch.blocking[g, p] >= 0.0:
+                scratch.excess[g, p] = scratch.detours[g, k] + (scratch.observed[p] - optimal[g])
 
 
 @kernel
@@ -308,7 +308,7 @@ def score_table(
         tables: The task.
         scratch: Room to work in.
         scores: ``[4]`` out: legibility per sequence (Eq. 3), expected metres of one whole task, mean and greatest
-            detour of a reach (path over straight line). NaN where a point is not free or a leg has no way.
+            detour of a reach (path over straight line). NaN where a point is not free or a leg has no path.
     """
     scores[:] = np.nan
     corners, target_points = scratch.corners, scratch.target_points

@@ -1,4 +1,4 @@
-"""The score of one table, explained: every stage, goal and observed share of a reach, by the readable definition."""
+"""The score of one table by the readable definition, and how every stage, goal and prefix adds to it."""
 
 from __future__ import annotations
 
@@ -11,11 +11,15 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.errors import LayoutError
-from legible_envs.legibility import Ties, env_legibility, tied_goals
+from legible_envs.legibility import env_legibility, tied_goals
+from legible_envs.observer import ObserverModel
+from legible_envs.tabletop.geometry.paths import ShortestPaths
 from legible_envs.tabletop.layout import TabletopLayout
+from legible_envs.tabletop.scoring.tables import observed_fractions
+from legible_envs.tabletop.task import TabletopTask
 from legible_envs.tasks import TaskGraph
 
-__all__ = ["explain_table", "points_along"]
+__all__ = ["as_task", "check_points", "explain_layout", "path_lengths", "points_along", "score_layout", "summarise"]
 
 Floats = npt.NDArray[np.float64]
 
@@ -28,40 +32,131 @@ def points_along(path: Floats, fractions: Sequence[float]) -> tuple[Floats, floa
     return np.column_stack([np.interp(at, ends, path[:, axis]) for axis in (0, 1)]), float(ends[-1])
 
 
-def explain_table(
+def check_points(layout: TabletopLayout, task: TabletopTask) -> None:
+    """Whether a layout has the objects and starts of a task, by name.
+
+    Raises:
+        LayoutError: It has others.
+    """
+    expected = (*task.layout.goals, *task.layout.table.starts)
+    got = (*layout.goals, *layout.table.starts)
+    if got != expected:
+        raise LayoutError(f"task {task.name!r} is about {list(expected)}, the layout has {list(got)}", rule="object")
+
+
+def path_lengths(layout: TabletopLayout, pairs: Sequence[tuple[str, str]]) -> dict[tuple[str, str], float]:
+    """Metres of the shortest path between the two places of each pair, objects or starts.
+
+    Raises:
+        LayoutError: There is no path; the message names both places.
+    """
+    names = (*layout.goals, *layout.table.starts)
+    places = np.array([layout.place(name) for name in names])
+    obstacles = [(*o.at, o.angle, *o.size) for o in layout.obstacles]
+    metres = ShortestPaths(places, obstacles, layout.table.hand, layout.table.size, names).lengths(places)
+    lengths = {(a, b): float(metres[names.index(a), names.index(b)]) for a, b in pairs}
+    for (a, b), length in lengths.items():
+        if math.isinf(length):
+            raise LayoutError(f"the task cannot be done on this table: no path from {a} to {b}", rule="reachable")
+    return lengths
+
+
+def score_layout(
     layout: TabletopLayout,
-    task: TaskGraph,
+    task: TabletopTask | str | None = None,
     *,
-    fractions: Sequence[float],
-    beta: float = 20.0,
-    c: float = 1.0,
-    unit: float = 0.05,
-    ties: Ties = "expected",
-    tie_tolerance: float = 1e-9,
+    observer: ObserverModel = ObserverModel.in_metres(),
+) -> dict[str, Any]:
+    """Score any table.
+
+    The readable definition; :meth:`.TabletopScorer.score_layout` computes the same by compiled code.
+
+    Args:
+        layout: The table, with the objects and starts of the task.
+        task: The task, or the name of one that comes with the package; ``"columns"`` if None.
+        observer: How the observer infers goals, which prefixes count, and what errors cost, in metres.
+
+    Returns:
+        ``score`` (Eq. 3 per sequence); ``distance`` (metres per execution); ``normalised``, the score over the expected
+        number of (stage, goal) pairs, at most 1; ``single_goal_share``, the part of the score that comes from stages
+        with one valid goal, and ``single_goal_score``; ``mean_detour`` and ``max_detour`` (shortest path over straight
+        line, over all trajectories to goals); ``num_obstacles``; ``candidate_set`` (``"task"``: valid by precedence);
+        ``num_sequences``; ``num_stages``; ``layout_id``.
+
+    Raises:
+        LayoutError: The layout has other objects than the task, or a place the task needs cannot be reached.
+    """
+    task = as_task(task)
+    check_points(layout, task)
+    legs = task.graph.legs()
+    distance = math.fsum(legs[pair] * metres for pair, metres in path_lengths(layout, list(legs)).items())
+    reaches: dict[tuple[str, str], float] = {}
+    for t in task.graph.transitions():
+        reaches[t.start, t.goal] = reaches.get((t.start, t.goal), 0.0) + t.weight
+    detours = {
+        (start, goal): _detour(metres, layout.place(start), layout.place(goal))
+        for (start, goal), metres in path_lengths(layout, list(reaches)).items()
+    }
+    return summarise(
+        layout,
+        task.graph,
+        score=math.fsum(row["contribution"] for row in explain_layout(layout, task, observer=observer)),
+        distance=distance,
+        mean_detour=math.fsum(reaches[pair] * detours[pair] for pair in reaches) / math.fsum(reaches.values()),
+        max_detour=max(1.0, *detours.values()),
+    )
+
+
+def summarise(
+    layout: TabletopLayout, task: TaskGraph, *, score: float, distance: float, mean_detour: float, max_detour: float
+) -> dict[str, Any]:
+    """The scores of a layout with what belongs beside them; see :func:`score_layout`."""
+    stages = task.stages()
+    # Where one goal is valid, p(2) = 0 and every prefix has the margin 1.
+    single = math.fsum(stage.weight for stage in stages if len(stage.goals) == 1)
+    return {
+        "score": score,
+        "distance": distance,
+        "normalised": score / sum(stage.weight * len(stage.goals) for stage in stages),
+        "single_goal_score": single,
+        "single_goal_share": single / score if score else math.nan,
+        "mean_detour": mean_detour,
+        "max_detour": max_detour,
+        "num_obstacles": len(layout.obstacles),
+        "candidate_set": "task",
+        "num_sequences": task.num_sequences,
+        "num_stages": len(stages),
+        "layout_id": layout.layout_id,
+    }
+
+
+def explain_layout(
+    layout: TabletopLayout,
+    task: TabletopTask | str | None = None,
+    *,
+    observer: ObserverModel = ObserverModel.in_metres(),
 ) -> list[dict[str, Any]]:
     """Which stages, goals and prefixes win or lose the score of a table.
 
     Args:
-        layout: The table, in which every reach of the task has a way.
-        task: The precedence of the reaches.
-        fractions: Observed shares of a reach; each weighs the same.
-        beta: Rationality per metre (Eq. 1).
-        c: Cost per ``unit`` observed in doubt (Eq. 2).
-        unit: Metres.
-        ties: ``"expected"`` or ``"strict"``, see :func:`~legible_envs.legibility.env_legibility`.
-        tie_tolerance: Excess costs up to this tie, in metres.
+        layout: The table, with the objects and starts of the task.
+        task: The task, or the name of one that comes with the package; ``"columns"`` if None.
+        observer: How the observer infers goals, which prefixes count, and what errors cost, in metres.
 
     Returns:
         A row for every stage and goal, the greatest loss first: ``start``, ``goals`` (valid), ``goal`` (true),
-        ``weight`` (expected number of such stages), ``score`` (expected legibility of the reach), ``contribution``
-        (weight times score; contributions sum to the layout's score), ``length`` and ``detour`` of the reach,
+        ``weight`` (expected number of such stages), ``score`` (expected legibility of the trajectory), ``contribution``
+        (weight times score; contributions sum to the layout's score), ``length`` and ``detour`` of the trajectory,
         ``ties_with`` (share of the prefixes at which each other goal ties with the true one), and ``prefixes``: a row
-        for every prefix with the observed ``fraction``, ``t`` in units, its ``weight``, ``value`` of Eq. 2 and
-        ``ties_with``.
+        for every prefix with the observed ``fraction``, ``t`` in the observer's units, its ``weight``, ``value`` of
+        Eq. 2 and ``ties_with``.
 
     Raises:
-        LayoutError: A reach has no way.
+        LayoutError: The layout has other objects than the task, or a goal cannot be reached.
     """
+    task = as_task(task)
+    check_points(layout, task)
+    fractions = observed_fractions(observer.prefix)
     costs: dict[tuple[float, float], dict[str, float]] = {}
 
     def costs_from(x: float, y: float) -> dict[str, float]:
@@ -70,26 +165,28 @@ def explain_table(
         return costs[x, y]
 
     rows = []
-    for stage in task.stages():
+    for stage in task.graph.stages():
         home = layout.place(stage.start)
         optimal = {goal: costs_from(*home)[goal] for goal in stage.goals}
         for goal in stage.goals:
             if math.isinf(optimal[goal]):
-                raise LayoutError(f"no way from {stage.start} to {goal}", rule="reachable")
+                raise LayoutError(f"no path from {stage.start} to {goal}", rule="reachable")
             points, length = points_along(layout.paths.polyline(home, goal), fractions)
             prefixes: list[dict[str, Any]] = []
             for fraction, (x, y) in zip(fractions, points.tolist(), strict=True):
                 remaining = {g: costs_from(x, y)[g] for g in stage.goals}
-                t = fraction * length / unit
-                value = env_legibility(
-                    goal, remaining, optimal, t, beta=beta, c=c, ties=ties, tie_tolerance=tie_tolerance
-                )
-                others = [g for g in tied_goals(remaining, optimal, tie_tolerance) if g != goal]
+                observed = fraction * length
+                others = [g for g in tied_goals(remaining, optimal, observer.tie_tolerance) if g != goal]
                 prefixes.append(
-                    {"fraction": fraction, "t": t, "weight": 1 / len(fractions), "value": value, "ties_with": others}
+                    {
+                        "fraction": fraction,
+                        "t": observed / observer.unit,
+                        "weight": 1 / len(fractions),
+                        "value": env_legibility(goal, remaining, optimal, observed, observer),
+                        "ties_with": others,
+                    }
                 )
             score = math.fsum(p["value"] for p in prefixes) / len(fractions)
-            straight = math.dist(home, layout.place(goal))
             rows.append(
                 {
                     "start": stage.start,
@@ -99,12 +196,23 @@ def explain_table(
                     "score": score,
                     "contribution": stage.weight * score,
                     "length": length,
-                    "detour": length / straight if straight else 1.0,
+                    "detour": _detour(length, home, layout.place(goal)),
                     "ties_with": _shares(prefixes),
                     "prefixes": [{**p, "ties_with": dict.fromkeys(p["ties_with"], 1.0)} for p in prefixes],
                 }
             )
     return sorted(rows, key=lambda row: float(row["contribution"]))
+
+
+def as_task(task: TabletopTask | str | None) -> TabletopTask:
+    """A task, or the one of that name that comes with the package; ``"columns"`` for None."""
+    return task if isinstance(task, TabletopTask) else TabletopTask.named(task or "columns")
+
+
+def _detour(length: float, start: tuple[float, float], goal: tuple[float, float]) -> float:
+    """A path's length over that of the straight line; 1 where start and goal are one place."""
+    straight = math.dist(start, goal)
+    return length / straight if straight else 1.0
 
 
 def _shares(prefixes: Sequence[dict[str, Any]]) -> dict[str, float]:

@@ -89,7 +89,7 @@ def settle_ties(
     value: Floats,
     total: Floats,
 ) -> None:
-    """Overwrite ``value / total`` where goals tie with the true one: a guess among them costs what was observed."""
+    """Overwrite ``value / total`` where goals tie with the true one: to guess among them costs what was observed."""
     for p in range(num_points):
         goal = p // per_goal
         tied = 0

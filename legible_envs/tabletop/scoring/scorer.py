@@ -1,4 +1,4 @@
-"""Scores of tables: legibility, distance and detours of layouts and of batches of genomes."""
+"""The score of tables: one task and one observer, for layouts and for batches of genomes."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.errors import LayoutError
-from legible_envs.legibility import Ties
+from legible_envs.observer import ObserverModel
 from legible_envs.tabletop.layout import MAX_OBSTACLES, TabletopLayout
 from legible_envs.tabletop.objects import OBSTACLE_SIZE, numbers
+from legible_envs.tabletop.scoring import explanation
 from legible_envs.tabletop.scoring.exact_kernels import OUTPUTS, make_scratch, score_genomes, score_table
-from legible_envs.tabletop.scoring.tables import make_tables, observed_fractions
+from legible_envs.tabletop.scoring.tables import make_tables
 from legible_envs.tabletop.task import TabletopTask
 
 __all__ = ["TableScores", "TabletopScorer"]
@@ -27,7 +28,7 @@ class TableScores(NamedTuple):
     Attributes:
         legibility: ``(n,)`` Eq. 3 per valid sequence.
         distance: ``(n,)`` expected metres of one whole task, fetching and carrying.
-        mean_detour: ``(n,)`` shortest path over straight line, the mean over all reaches of the task.
+        mean_detour: ``(n,)`` shortest path over straight line, the mean over all trajectories to goals.
         max_detour: ``(n,)`` the greatest of them.
     """
 
@@ -38,52 +39,45 @@ class TableScores(NamedTuple):
 
 
 class TabletopScorer:
-    """How legible reaches on a table are (Tung et al., HRI 2024, Eq. 1 to 3), with shortest paths among obstacles.
+    """How legible people's motion is on tables (Tung et al., HRI 2024, Eq. 1 to 3): shortest paths among obstacles.
 
     Only what makes a score undefined is checked here; overlapping objects and the other rules of a layout are for
     :meth:`~legible_envs.tabletop.layout.TabletopLayout.validate` and the workspace.
 
     Args:
         task: The task, or the name of one that comes with the package.
-        beta: Rationality per metre.
-        c: Cost per ``unit`` observed in doubt.
-        unit: Metres.
-        prefix: ``"mean"`` (ten arc-length midpoints of the reach), or observed fractions in (0, 1].
-        ties: ``"expected"`` or ``"strict"``, see :func:`~legible_envs.legibility.env_legibility`.
-        tie_tolerance: Excess costs up to this tie, in metres.
+        observer: How the observer infers goals, which prefixes count, and what errors cost, in metres;
+            :meth:`~legible_envs.observer.ObserverModel.in_metres` has the defaults of a table.
         max_obstacles: Places for obstacles in a genome.
         obstacle_size: Length and width of a genome's obstacles in metres.
 
     Attributes:
+        task: The task.
+        observer: The observer.
         genome_size: Numbers in a genome: ``2 M + 4 max_obstacles`` for ``M`` movable objects.
-        best_possible: The score of reaches read from the start on: ``sum of w |V|``.
+        best_possible: The score if every goal were certain from the start on: ``sum of w |V|``.
 
     Raises:
         TaskError: The task has more than 12 goals that are candidates together.
-        ValueError: A parameter is out of range.
+        ValueError: A parameter is out of range, or the observer's ``prefix`` is ``"sum"``.
+
+    Example:
+        >>> scorer = TabletopScorer("tea", observer=ObserverModel.in_metres(beta=10))
+        >>> scores = scorer.score_layout(scorer.task.layout)
+        >>> 0 < scores["normalised"] < 1, scores["num_sequences"]
+        (True, 12)
     """
 
     def __init__(
         self,
         task: TabletopTask | str = "columns",
         *,
-        beta: float = 20.0,
-        c: float = 1.0,
-        unit: float = 0.05,
-        prefix: str | float | Iterable[float] = "mean",
-        ties: Ties = "expected",
-        tie_tolerance: float = 1e-9,
+        observer: ObserverModel = ObserverModel.in_metres(),
         max_obstacles: int = MAX_OBSTACLES,
         obstacle_size: tuple[float, float] = OBSTACLE_SIZE,
     ) -> None:
-        self.task = TabletopTask.named(task) if isinstance(task, str) else task
-        for name, value, least in (("beta", beta, 0), ("c", c, 0), ("tie_tolerance", tie_tolerance, 0)):
-            if not least <= value < np.inf:
-                raise ValueError(f"{name} must be a finite number >= {least}, got {value!r}")
-        if not 0 < unit < np.inf:
-            raise ValueError(f"unit must be a positive number of metres, got {unit!r}")
-        if ties not in ("expected", "strict"):
-            raise ValueError(f"ties must be 'expected' or 'strict', got {ties!r}")
+        self.task = explanation.as_task(task)
+        self.observer = observer
         if isinstance(max_obstacles, bool) or not isinstance(max_obstacles, int) or max_obstacles < 0:
             raise ValueError(f"max_obstacles must be an integer >= 0, got {max_obstacles!r}")
         length, width = numbers(obstacle_size, 2, "obstacle_size", positive=True)
@@ -94,22 +88,13 @@ class TabletopScorer:
         self._template = self._points(layout)
         self.genome_size = 2 * len(self._movable) + 4 * max_obstacles
         self.best_possible = sum(stage.weight * len(stage.goals) for stage in self.task.graph.stages())
-        self.tables = make_tables(
-            self.task.graph,
-            (*layout.goals, *layout.table.starts),
-            fractions=observed_fractions(prefix),
-            beta=beta,
-            c=c,
-            unit=unit,
-            ties=ties,
-            tie_tolerance=tie_tolerance,
-        )
+        self.tables = make_tables(self.task.graph, (*layout.goals, *layout.table.starts), observer)
 
     @staticmethod
     def _points(layout: TabletopLayout) -> Floats:
         return np.array([*(o.at for o in layout.objects), *layout.table.starts.values()])
 
-    def genomes(self, genomes: Any) -> TableScores:
+    def score_genomes(self, genomes: Any) -> TableScores:
         """Scores of ``(n, d)`` genomes; rows that are not finite score NaN.
 
         Raises:
@@ -133,20 +118,43 @@ class TabletopScorer:
         scores[finite] = found
         return TableScores(*scores.T)
 
-    def layout(self, layout: TabletopLayout) -> TableScores:
-        """Scores of one layout, each of shape ``(1,)``; its objects and starts are named like the task's.
+    def score_layouts(self, layouts: Iterable[TabletopLayout]) -> TableScores:
+        """Scores of ``n`` layouts, whose objects and starts are named like the task's; NaN where undefined.
 
         Raises:
-            LayoutError: The layout has other objects or starts than the task.
+            LayoutError: A layout has other objects or starts than the task.
         """
-        expected = (*self.task.layout.goals, *self.task.layout.table.starts)
-        got = (*layout.goals, *layout.table.starts)
-        if got != expected:
-            raise LayoutError(
-                f"task {self.task.name!r} is about {list(expected)}, the layout has {list(got)}", rule="object"
-            )
-        boxes = layout.paths.boxes
-        scores = np.empty(OUTPUTS)
-        scratch = make_scratch(len(boxes), self.tables)
-        score_table(self._points(layout), boxes, layout.table.size, self.tables, scratch, scores)
-        return TableScores(*scores[:, None])
+        layouts = list(layouts)
+        scores = np.empty((len(layouts), OUTPUTS))
+        for layout, row in zip(layouts, scores, strict=True):
+            explanation.check_points(layout, self.task)
+            boxes = layout.paths.boxes
+            scratch = make_scratch(len(boxes), self.tables)
+            score_table(self._points(layout), boxes, layout.table.size, self.tables, scratch, row)
+        return TableScores(*scores.T)
+
+    def score_layout(self, layout: TabletopLayout) -> dict[str, Any]:
+        """Score, distance and what belongs beside them.
+
+        See :func:`~legible_envs.tabletop.scoring.explanation.score_layout` for what is returned.
+
+        Raises:
+            LayoutError: The layout has other objects than the task, or a place the task needs cannot be reached.
+        """
+        score, distance, mean_detour, max_detour = (float(values[0]) for values in self.score_layouts([layout]))
+        if np.isnan(score):
+            explanation.path_lengths(layout, list(self.task.graph.legs()))
+            raise LayoutError("the task cannot be done on this table: an obstacle covers a place", rule="reachable")
+        return explanation.summarise(
+            layout, self.task.graph, score=score, distance=distance, mean_detour=mean_detour, max_detour=max_detour
+        )
+
+    def explain_layout(self, layout: TabletopLayout) -> list[dict[str, Any]]:
+        """A row for every stage and goal, the greatest loss first.
+
+        See :func:`~legible_envs.tabletop.scoring.explanation.explain_layout` for what is returned.
+
+        Raises:
+            LayoutError: The layout has other objects than the task, or a goal cannot be reached.
+        """
+        return explanation.explain_layout(layout, self.task, observer=self.observer)

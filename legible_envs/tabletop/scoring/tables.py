@@ -1,4 +1,4 @@
-"""From a task on a table to the arrays the score kernel reads."""
+"""From a task on a table and an observer to the arrays of the score kernel."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.errors import TaskError
-from legible_envs.legibility import Ties
+from legible_envs.observer import ObserverModel, PrefixSpec
 from legible_envs.tabletop.scoring.exact_kernels import ReachTables
 from legible_envs.tasks import Stage, TaskGraph
 
@@ -19,48 +19,32 @@ MAX_GOALS = 12
 POINTS = 10
 
 
-def observed_fractions(prefix: str | float | Iterable[float]) -> tuple[float, ...]:
-    """Which shares of a reach are observed: ten midpoints for ``"mean"``, or ascending fractions in (0, 1].
+def observed_fractions(prefix: PrefixSpec) -> tuple[float, ...]:
+    """Which shares of a trajectory are observed: ten midpoints for ``"mean"``, or the given fractions, ascending.
 
     Raises:
-        ValueError: Anything else; a reach has no steps to ``"sum"`` over.
+        ValueError: ``"sum"``: a trajectory on a table has no steps to sum over.
     """
+    if prefix == "mean":
+        return tuple((i + 0.5) / POINTS for i in range(POINTS))
     if isinstance(prefix, str):
-        if prefix == "mean":
-            return tuple((i + 0.5) / POINTS for i in range(POINTS))
         raise ValueError(f"on a table, prefix must be 'mean' or fractions in (0, 1], got {prefix!r}")
-    fractions = tuple(sorted(float(f) for f in (prefix if isinstance(prefix, Iterable) else (prefix,))))
-    if not fractions or not all(0 < f <= 1 for f in fractions):
-        raise ValueError(f"on a table, prefix must be 'mean' or fractions in (0, 1], got {prefix!r}")
-    return fractions
+    return tuple(sorted(prefix))
 
 
-def make_tables(
-    task: TaskGraph,
-    points: Sequence[str],
-    *,
-    fractions: Sequence[float],
-    beta: float,
-    c: float,
-    unit: float,
-    ties: Ties,
-    tie_tolerance: float,
-) -> ReachTables:
+def make_tables(task: TaskGraph, points: Sequence[str], observer: ObserverModel) -> ReachTables:
     """Build the tables of :class:`~legible_envs.tabletop.scoring.exact_kernels.ReachTables`.
 
     Args:
         task: The task; its places are names of points.
         points: Names of all points: objects, then starts.
-        fractions: Observed shares of a reach, ascending.
-        beta: Rationality per metre.
-        c: Cost per ``unit`` observed in doubt.
-        unit: Metres.
-        ties: ``"expected"`` or ``"strict"``.
-        tie_tolerance: Excess costs up to this tie, in metres.
+        observer: How the observer infers goals, which prefixes count, and what errors cost, in metres.
 
     Raises:
         TaskError: The task names a place the table lacks, or has more than 12 goals that are candidates together.
+        ValueError: The observer's ``prefix`` is ``"sum"``.
     """
+    fractions = observed_fractions(observer.prefix)
     unknown = [place for place in task.places if place not in points]
     if unknown:
         raise TaskError(f"the task needs {unknown}, which the table lacks; it has {list(points)}")
@@ -85,10 +69,10 @@ def make_tables(
         leg_target=_ints(targets.index(b) for _, b in legs),
         leg_weight=np.array(list(legs.values()), dtype=np.float64),
         fractions=np.array(fractions, dtype=np.float64),
-        beta=float(beta),
-        penalty=float(c) / float(unit),
-        tie_tolerance=float(tie_tolerance),
-        strict=ties == "strict",
+        beta=observer.beta,
+        penalty=observer.c / observer.unit,
+        tie_tolerance=observer.tie_tolerance,
+        strict=observer.ties == "strict",
     )
 
 
@@ -119,7 +103,7 @@ def _stage_weights(groups: Sequence[tuple[str, list[str], list[Stage]]], num_poi
 
 
 def _legs(task: TaskGraph) -> dict[tuple[str, str], float]:
-    """Expected legs, both directions of a way together; the second end is a goal wherever one is."""
+    """Expected legs, both directions of a path together; the second end is a goal wherever one is."""
     legs: dict[tuple[str, str], float] = defaultdict(float)
     goals = set(task.goals)
     for (a, b), weight in task.legs().items():

@@ -11,17 +11,19 @@ import pytest
 
 from legible_envs import LayoutError
 from legible_envs.legibility import From, prefix_weights
+from legible_envs.observer import ObserverModel
 from legible_envs.overcooked import OvercookedLayout, OvercookedWorkspace
 from legible_envs.overcooked.scoring.boltzmann import (
     DEFAULT_RATIONALITY,
+    HumanModel,
     boltzmann_legibility,
-    boltzmann_walks,
-    check_human,
+    boltzmann_trajectories,
     step_probabilities,
 )
 from legible_envs.overcooked.scoring.explanation import ambiguity, explain_layout, grid_graph, score_layout
 from legible_envs.tasks import Subtask, TaskGraph
-from legible_envs.workspace import check_workspace, make_workspace
+from legible_envs.workspace import make_workspace
+from legible_envs.workspace_checks import check_workspace
 from tests.legible_envs.overcooked.kitchens import all_shortest_walks, random_kitchen, steps_between
 
 TINY = [
@@ -95,12 +97,14 @@ def test_definition_equals_listing_every_walk(layout, prefix):
         arrived = sum(probability for _, probability in listed)
         settings = {"beta": 0.7, "c": 1.3, "strict": strict}
         expected = sum(p * value_of_walk(layout, w, "serving", goal, goals, prefix, **settings) for w, p in listed)
-        walks = boltzmann_walks(graph, From("serving"), goal, rationality=rationality, horizon=horizon, prefix=prefix)
+        walks = boltzmann_trajectories(
+            graph, From("serving"), goal, rationality=rationality, horizon=horizon, prefix=prefix
+        )
         ties = "strict" if strict else "expected"
-        scores = boltzmann_legibility(graph, From("serving"), goals, walks, beta=0.7, c=1.3, ties=ties)
+        scores = boltzmann_legibility(graph, From("serving"), goals, walks, ObserverModel(0.7, 1.3, ties=ties))
         assert sum(s.probability * s.weight * s.value for s in scores) == pytest.approx(expected / arrived, abs=1e-11)
-        assert walks.lost_mass == pytest.approx(1 - arrived, abs=1e-12)
-        assert walks.lost_mass > 0
+        assert walks.truncated_probability == pytest.approx(1 - arrived, abs=1e-12)
+        assert walks.truncated_probability > 0
         assert walks.mean_length == pytest.approx(sum(p * (len(w) + 1) for w, p in listed) / arrived)
 
 
@@ -119,9 +123,9 @@ def test_cell_costs_steer_the_walker():
     costs = np.ones(layout.shape)
     costs[1, 1] = 3.0
     listed = list(walks_by_listing(layout, "serving", "onion", 0.9, 9, costs))
-    walks = boltzmann_walks(grid_graph(layout, costs), From("serving"), "onion", rationality=0.9, horizon=9)
+    walks = boltzmann_trajectories(grid_graph(layout, costs), From("serving"), "onion", rationality=0.9, horizon=9)
     arrived = sum(p for _, p in listed)
-    assert walks.lost_mass == pytest.approx(1 - arrived, abs=1e-12)
+    assert walks.truncated_probability == pytest.approx(1 - arrived, abs=1e-12)
     at_second_step = {v.node: v.probability for v in walks.visits if v.step == 2}
     for cell, share in at_second_step.items():
         assert share == pytest.approx(sum(p for w, p in listed if len(w) > 1 and w[1] == cell) / arrived)
@@ -183,7 +187,7 @@ def test_limit_of_perfect_rationality():
                 p * value_of_walk(layout, w, start, goal, goals, "mean") for w, p in zip(walks, shares, strict=True)
             )
             graph = grid_graph(layout)
-            ways = boltzmann_walks(graph, From(start), goal, rationality=60.0, horizon=20)
+            ways = boltzmann_trajectories(graph, From(start), goal, rationality=60.0, horizon=20)
             scores = boltzmann_legibility(graph, From(start), goals, ways)
             assert sum(s.probability * s.weight * s.value for s in scores) == pytest.approx(expected, abs=1e-9)
             assert ways.mean_length == pytest.approx(len(walks[0]) + 1)
@@ -203,9 +207,10 @@ def _share_of_local_choices(layout, walk, goal) -> float:
 def test_limit_is_the_shortest_walker_where_ways_do_not_fork(prefix):
     corridor = OvercookedLayout.from_ascii("XOXXFTX\nX     X\nXXSXXXX")
     task = TaskGraph([Subtask("a", ("onion",)), Subtask("b", ("fish",)), Subtask("c", ("tomato",))], "serving")
-    shortest = score_layout(corridor, task, prefix=prefix)["score"]
+    observer = ObserverModel(prefix=prefix)
+    shortest = score_layout(corridor, task, observer=observer)["score"]
     near = [
-        abs(score_layout(corridor, task, prefix=prefix, human="boltzmann", rationality=r)["score"] - shortest)
+        abs(score_layout(corridor, task, observer=observer, human=HumanModel("boltzmann", r))["score"] - shortest)
         for r in (1.0, 3.0, 9.0, 30.0)
     ]
     assert near == sorted(near, reverse=True)
@@ -213,17 +218,15 @@ def test_limit_is_the_shortest_walker_where_ways_do_not_fork(prefix):
     assert near[3] < 1e-9
 
 
-def test_lost_mass_is_reported_and_falls_with_the_horizon():
+def test_the_truncated_probability_is_reported_and_falls_with_the_horizon():
     layout = TINY[3]
     task = TaskGraph([Subtask("a", ("tomato",)), Subtask("b", ("onion@(0,1)",))], "serving")
-    lost = [
-        score_layout(layout, task, human="boltzmann", rationality=0.2, horizon=horizon) for horizon in (9, 20, 80, 400)
-    ]
-    masses = [summary["lost_mass"] for summary in lost]
+    lost = [score_layout(layout, task, human=HumanModel("boltzmann", 0.2, horizon)) for horizon in (9, 20, 80, 400)]
+    masses = [summary["truncated_probability"] for summary in lost]
     assert masses[0] > 0.2
     assert masses == sorted(masses, reverse=True)
     assert masses[-1] < 1e-9
-    assert all(s["largest_lost_mass"] >= s["lost_mass"] for s in lost)
+    assert all(s["largest_truncated_probability"] >= s["truncated_probability"] for s in lost)
     assert [s["horizon"] for s in lost] == [9, 20, 80, 400]
     assert abs(lost[2]["score"] - lost[3]["score"]) < abs(lost[0]["score"] - lost[3]["score"])
 
@@ -231,15 +234,15 @@ def test_lost_mass_is_reported_and_falls_with_the_horizon():
 def test_default_horizon_loses_almost_nobody():
     rng = np.random.default_rng(0)
     ws = OvercookedWorkspace((5, 5), human="boltzmann", rationality=1.1)
-    assert max(ws.summary(genome)["lost_mass"] for genome in ws.sample(20, rng)) < 1e-3
+    assert max(ws.summary(genome)["truncated_probability"] for genome in ws.sample(20, rng)) < 1e-3
     ws = OvercookedWorkspace((7, 7), human="boltzmann", rationality=1.1)
-    assert max(ws.summary(genome)["lost_mass"] for genome in ws.sample(3, rng)) < 1e-6
+    assert max(ws.summary(genome)["truncated_probability"] for genome in ws.sample(3, rng)) < 1e-6
 
 
 def test_margins_only_where_one_goal_is_valid():
     layout = TINY[2]
     task = TaskGraph([Subtask("a", ("onion",)), Subtask("b", ("tomato",), after=("a",))], "serving")
-    summary = score_layout(layout, task, human="boltzmann", rationality=0.4)
+    summary = score_layout(layout, task, human=HumanModel("boltzmann", 0.4))
     assert summary["score"] == pytest.approx(2.0)
     assert summary["normalised"] == pytest.approx(1.0)
     assert summary["single_goal_share"] == pytest.approx(1.0)
@@ -247,7 +250,7 @@ def test_margins_only_where_one_goal_is_valid():
 
 def test_explanations_and_doubt():
     layout = OvercookedWorkspace((5, 5)).decode(OvercookedWorkspace((5, 5)).sample(1, np.random.default_rng(2))[0])
-    people = {"human": "boltzmann", "rationality": 0.5}
+    people = {"human": HumanModel("boltzmann", 0.5)}
     rows = explain_layout(layout, **people)
     assert math.fsum(row["contribution"] for row in rows) == pytest.approx(score_layout(layout, **people)["score"])
     longest = max(len(row["prefixes"]) for row in rows)
@@ -300,7 +303,7 @@ def test_unreachable_goals_and_short_horizons():
     with pytest.raises(LayoutError, match="cannot be done"):
         score_layout(shut, task, human="boltzmann")
     with pytest.raises(ValueError, match="within 2 steps"):
-        boltzmann_walks(grid_graph(TINY[0]), From("serving"), "onion", rationality=1.0, horizon=2)
-    with pytest.raises(ValueError, match="no way"):
-        boltzmann_walks(grid_graph(shut), From("serving"), "tomato", rationality=1.0, horizon=9)
-    assert check_human("boltzmann", 2, None, 10).horizon == 22
+        boltzmann_trajectories(grid_graph(TINY[0]), From("serving"), "onion", rationality=1.0, horizon=2)
+    with pytest.raises(ValueError, match="no path"):
+        boltzmann_trajectories(grid_graph(shut), From("serving"), "tomato", rationality=1.0, horizon=9)
+    assert HumanModel("boltzmann", 2).within(10) == HumanModel("boltzmann", 2.0, 22)

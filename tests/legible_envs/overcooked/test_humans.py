@@ -17,6 +17,7 @@ import legible_envs  # noqa: F401
 from legible_envs import LayoutError
 from legible_envs.datasets.overcooked_2019 import RecordingsError, recorded_trajectories
 from legible_envs.legibility import From, env_legibility, optimal_costs, prefix_weights
+from legible_envs.observer import ObserverModel
 from legible_envs.overcooked import OvercookedLayout, soup_task
 from legible_envs.overcooked.humans import (
     BoltzmannWalker,
@@ -25,7 +26,7 @@ from legible_envs.overcooked.humans import (
     rationality_spread,
     simulate_participants,
 )
-from legible_envs.overcooked.scoring.boltzmann import boltzmann_legibility, boltzmann_walks
+from legible_envs.overcooked.scoring.boltzmann import boltzmann_legibility, boltzmann_trajectories
 from legible_envs.overcooked.scoring.explanation import grid_graph
 from legible_envs.overcooked.trajectories import record_episode
 from legible_envs.rollouts import Trajectory
@@ -132,23 +133,22 @@ def test_half_the_ticks_are_idle():
 @pytest.mark.parametrize("prefix", ["mean", "sum", (0.3, 0.6)], ids=str)
 def test_exact_score_equals_monte_carlo(prefix):
     rng = np.random.default_rng(7)
-    graph = grid_graph(OPEN)
+    graph, observer = grid_graph(OPEN), ObserverModel(c=0.7)
     goals = ["onion", "tomato", "dish"]
     costs = {goal: optimal_costs(graph, goal) for goal in goals}
     optimal = {goal: costs[goal][From("pot")] for goal in goals}
     for goal in goals:
-        walks = boltzmann_walks(graph, From("pot"), goal, rationality=0.9, horizon=120, prefix=prefix)
-        exact = sum(
-            s.probability * s.weight * s.value for s in boltzmann_legibility(graph, From("pot"), goals, walks, c=0.7)
-        )
-        assert walks.lost_mass < 1e-9
+        walks = boltzmann_trajectories(graph, From("pot"), goal, rationality=0.9, horizon=120, prefix=prefix)
+        scores = boltzmann_legibility(graph, From("pot"), goals, walks, observer)
+        exact = sum(s.probability * s.weight * s.value for s in scores)
+        assert walks.truncated_probability < 1e-9
         values = []
         for walk in BoltzmannWalker(rationality=0.9).sample(OPEN, "pot", goal, 1500, rng):
             cells = [tuple(cell) for cell in walk.states.tolist()][:-1]
             weights = prefix_weights(prefix, len(cells) + 1)
             values.append(
                 sum(
-                    weight * env_legibility(goal, {g: costs[g][cell] for g in goals}, optimal, t, c=0.7)
+                    weight * env_legibility(goal, {g: costs[g][cell] for g in goals}, optimal, t, observer)
                     for t, (cell, weight) in enumerate(zip(cells, weights, strict=True), 1)
                     if weight
                 )

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from legible_envs import LayoutError, TaskError
 from legible_envs.legibility import (
     From,
-    check_prefix,
     env_legibility,
     goal_legibility,
     posterior,
@@ -20,7 +19,8 @@ from legible_envs.legibility import (
     task_legibility,
     tied_goals,
 )
-from legible_envs.overcooked import OvercookedLayout, OvercookedWorkspace
+from legible_envs.observer import ObserverModel, check_prefix
+from legible_envs.overcooked import OvercookedLayout, OvercookedScorer, OvercookedWorkspace
 from legible_envs.overcooked.scoring.explanation import (
     ambiguity,
     explain_layout,
@@ -28,6 +28,7 @@ from legible_envs.overcooked.scoring.explanation import (
     layout_distance,
     score_layout,
 )
+from legible_envs.tabletop import TabletopWorkspace
 from legible_envs.tasks import Subtask, TaskGraph
 from tests.legible_envs.overcooked.kitchens import brute_force_legibility, brute_force_reach, random_kitchen
 from tests.support.plain_python import printed_both_ways
@@ -59,12 +60,35 @@ def test_env_legibility_by_hand():
     optimal = {"a": 4.0, "b": 4.0, "c": 6.0}
     remaining = {"a": 2.0, "b": 2.0, "c": 6.0}
     assert tied_goals(remaining, optimal) == ["a", "b"]
-    assert env_legibility("a", remaining, optimal, step=2) == -1.0
-    assert env_legibility("a", remaining, optimal, step=2, ties="strict", c=3.0) == -6.0
-    assert env_legibility("c", remaining, optimal, step=2) == -2.0
-    assert env_legibility("a", {"a": 2.0}, {"a": 4.0}, step=2) == 1.0
-    clear = env_legibility("a", {"a": 2.0, "b": 4.0}, {"a": 4.0, "b": 4.0}, step=2)
+    assert env_legibility("a", remaining, optimal, observed=2) == -1.0
+    assert env_legibility("a", remaining, optimal, 2, ObserverModel(ties="strict", c=3.0)) == -6.0
+    assert env_legibility("c", remaining, optimal, observed=2) == -2.0
+    assert env_legibility("a", {"a": 2.0}, {"a": 4.0}, observed=2) == 1.0
+    clear = env_legibility("a", {"a": 2.0, "b": 4.0}, {"a": 4.0, "b": 4.0}, observed=2)
     assert clear == pytest.approx(math.tanh(1.0))
+    assert env_legibility("c", remaining, optimal, 2, ObserverModel(unit=0.5, c=3.0)) == -12.0
+
+
+def test_observers_check_their_settings():
+    observer = ObserverModel(beta=2, prefix=[0.5, 1])
+    assert observer == ObserverModel(2.0, prefix=(0.5, 1.0))
+    assert hash(observer) == hash(ObserverModel(2.0, prefix=(0.5, 1.0)))
+    table = ObserverModel.in_metres()
+    assert (table.beta, table.c, table.unit, table.prefix) == (20.0, 1.0, 0.05, "mean")
+    for settings_, message in (
+        ({"beta": -1}, "beta must be"),
+        ({"c": math.nan}, "c must be"),
+        ({"c": True}, "c must be"),
+        ({"tie_tolerance": math.inf}, "tie_tolerance must be"),
+        ({"unit": 0}, "unit must be"),
+        ({"unit": -1}, "unit must be"),
+        ({"ties": "first"}, "ties must be"),
+        ({"prefix": "median"}, "prefix must be"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            ObserverModel(**settings_)
+        with pytest.raises(ValueError, match=message):
+            ObserverModel.in_metres(**settings_)
 
 
 def test_prefix_weights():
@@ -87,7 +111,7 @@ def test_definition_equals_listing_every_ordering_and_every_walk(prefix, ties):
         expected = brute_force_legibility(
             layout, small_task, weigh=lambda n: prefix_weights(prefix, n), beta=0.7, c=1.3, strict=ties == "strict"
         )
-        value = task_legibility(grid_graph(layout), small_task, prefix=prefix, beta=0.7, c=1.3, ties=ties)
+        value = task_legibility(grid_graph(layout), small_task, ObserverModel(0.7, 1.3, prefix, ties))
         assert value == pytest.approx(expected, abs=1e-10)
 
 
@@ -124,15 +148,7 @@ def agree(shape, settings_, count, rng) -> None:
     legibility, distance = ws.scores(genomes)
     for genome, score, moves in zip(genomes, legibility, distance, strict=True):
         layout = ws.decode(genome)
-        slow = task_legibility(
-            grid_graph(layout),
-            ws.task,
-            prefix=ws.prefix,
-            beta=ws.beta,
-            c=ws.c,
-            ties=ws.ties,
-            tie_tolerance=ws.tie_tolerance,
-        )
+        slow = task_legibility(grid_graph(layout), ws.task, ws.observer)
         assert abs(slow - score) <= 1e-9
         assert abs(layout_distance(layout, ws.task) - moves) <= 1e-9
 
@@ -179,7 +195,7 @@ def test_weighted_kernel_equals_definition(kind, ties):
         genomes = ws.sample(6, rng)
         for genome, score in zip(genomes, ws.legibility(genomes), strict=True):
             graph = grid_graph(ws.decode(genome), costs)
-            slow = task_legibility(graph, ws.task, prefix=prefix, ties=ties)
+            slow = task_legibility(graph, ws.task, ObserverModel(prefix=prefix, ties=ties))
             assert abs(slow - score) <= 1e-9
         if kind == "ones":
             plain = OvercookedWorkspace(shape, prefix=prefix, ties=ties, pots=1).legibility(genomes)
@@ -247,10 +263,15 @@ def test_score_of_any_kitchen():
         [Subtask("onion", ("onion",), then=("pot",), count=3), Subtask("d", ("dish",), ("onion",), ("pot", "serving"))],
         "serving",
     )
-    result = score_layout(layout, task, prefix="sum")
+    observer = ObserverModel(prefix="sum")
+    result = score_layout(layout, task, observer=observer)
     assert result["num_stages"] == len(task.stages()) == 3
     assert result["distance"] == pytest.approx(layout_distance(layout, task))
-    rows = explain_layout(layout, task, prefix="sum")
+    rows = explain_layout(layout, task, observer=observer)
+    scorer = OvercookedScorer(task, observer=observer)
+    assert scorer.score_layout(layout) == result
+    assert scorer.explain_layout(layout) == rows
+    np.testing.assert_array_equal(scorer.ambiguity(layout), ambiguity(layout, task, observer=observer))
     assert result["score"] == pytest.approx(sum(row["contribution"] for row in rows))
     assert {row["goal"] for row in rows} == {"onion@(1,0)", "onion@(1,4)", "dish"}
     assert np.isfinite(ambiguity(layout, task)[1, 1])
@@ -324,3 +345,15 @@ def test_tasks_that_do_not_fit_the_kitchen():
         OvercookedWorkspace((7, 7), stations=("onion", "dish", "pot", "serving"))
     ws = OvercookedWorkspace((5, 5), stations=("onion", "dish", "pot", "serving"), recipes=[("onion",) * 3])
     assert np.isfinite(ws.legibility(ws.sample(3, np.random.default_rng(0)))).all()
+
+
+def test_workspaces_show_the_observer_their_keywords_describe():
+    ws = OvercookedWorkspace((5, 5), prefix=0.5, beta=2, c=3, ties="strict", tie_tolerance=0.1)
+    assert ws.observer == ws.scorer.observer == ObserverModel(2.0, 3.0, (0.5,), "strict", 0.1)
+    with pytest.raises(AttributeError):
+        ws.observer = ObserverModel()
+    table = TabletopWorkspace(prefix=(0.9, 0.1), beta=2, c=3, ties="strict", tie_tolerance=0.1, unit=0.2)
+    assert table.observer == ObserverModel.in_metres(2.0, 3.0, (0.9, 0.1), "strict", 0.1, 0.2)
+    assert TabletopWorkspace().observer == ObserverModel.in_metres()
+    with pytest.raises(AttributeError):
+        table.observer = ObserverModel()

@@ -6,10 +6,12 @@ import sys
 import numpy as np
 import pytest
 
+from legible_envs.observer import ObserverModel
 from legible_envs.overcooked import OvercookedWorkspace
 from legible_envs.tabletop import TabletopScorer, TabletopWorkspace
 from legible_envs.tabletop.design.differentiable import DifferentiableTable
-from legible_envs.workspace import check_workspace, make_workspace
+from legible_envs.workspace import make_workspace
+from legible_envs.workspace_checks import check_workspace
 from optimizers import EmitterError, check_emitter, search
 from optimizers.archives import archive_arrays
 
@@ -60,10 +62,10 @@ def differences(function, centres):
     ids=["defaults", "strict", "flat", "sharp"],
 )
 def test_is_the_compiled_score(task, settings):
-    scorer = TabletopScorer(task, max_obstacles=0, **settings)
+    scorer = TabletopScorer(task, max_obstacles=0, observer=ObserverModel.in_metres(**settings))
     table = DifferentiableTable(scorer)
     centres = layouts(task, 1 if task == "bins" else 40)
-    found = scorer.genomes(centres.reshape(len(centres), -1))
+    found = scorer.score_genomes(centres.reshape(len(centres), -1))
     tensor = torch.tensor(centres)
     np.testing.assert_allclose(table.legibility(tensor), found.legibility, atol=1e-9, rtol=0)
     np.testing.assert_allclose(table.distance(tensor), found.distance, atol=1e-9, rtol=0)
@@ -71,14 +73,14 @@ def test_is_the_compiled_score(task, settings):
 
 @pytest.mark.parametrize("ties", ["expected", "strict"])
 def test_is_the_compiled_score_where_goals_tie(ties):
-    scorer = TabletopScorer("columns", max_obstacles=0, ties=ties)
+    scorer = TabletopScorer("columns", max_obstacles=0, observer=ObserverModel.in_metres(ties=ties))
     centres = layouts("columns", 5)
     centres[0] = 0.3  # all in one place
     centres[1, :] = np.array([0.6, 0.05]) + np.linspace(0.1, 0.5, 8)[:, None] * [-0.6, 0.8]  # behind one another
     centres[2, 5] = centres[2, 4]
     centres[3, :4] = centres[3, 0]
     centres[4, 0] = scorer.task.layout.table.starts["home"]  # nothing to see on the way
-    found = scorer.genomes(centres.reshape(5, -1)).legibility
+    found = scorer.score_genomes(centres.reshape(5, -1)).legibility
     table = DifferentiableTable(scorer)
     np.testing.assert_allclose(table.legibility(torch.tensor(centres)), found, atol=1e-9, rtol=0)
     assert np.isfinite(table.gradients(centres, *ALL)[1]).all()
@@ -94,7 +96,7 @@ def test_gradients_are_slopes_of_the_compiled_score(task, count):
     assert slopes.shape == (count, 4, *centres.shape[1:])
     size = centres[0].size
     for k, field in enumerate(("legibility", "distance")):
-        expected = differences(lambda x, f=field: getattr(scorer.genomes(x.reshape(-1, size)), f), centres)
+        expected = differences(lambda x, f=field: getattr(scorer.score_genomes(x.reshape(-1, size)), f), centres)
         np.testing.assert_allclose(slopes[:, k], expected, atol=1e-5 * max(1.0, np.abs(expected).max()))
         assert np.abs(expected).max() > 0.01
 

@@ -8,7 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from legible_envs.errors import LayoutError, TaskError
-from legible_envs.tabletop import TableObject, TabletopLayout, TabletopTask, VirtualObstacle
+from legible_envs.observer import ObserverModel
+from legible_envs.tabletop import TableObject, TabletopLayout, TabletopTask, TabletopWorkspace, VirtualObstacle
+from legible_envs.tabletop.scoring.explanation import explain_layout, score_layout
 from legible_envs.tabletop.scoring.posterior_kernels import exponentials
 from legible_envs.tabletop.scoring.scorer import TabletopScorer
 from legible_envs.tasks import Subtask, TaskGraph
@@ -56,14 +58,14 @@ def valid_layouts(task, rng, scorer, count, max_obstacles=4):
     found = 0
     while found < count:
         layout = random_layout(task, rng, max_obstacles)
-        scores = scorer.layout(layout)
+        scores = scorer.score_layouts([layout])
         if math.isfinite(scores.legibility[0]):
             found += 1
             yield layout, scores
 
 
 def check_random(task, seed, count, max_obstacles=4, **options):
-    scorer = TabletopScorer(task, **options)
+    scorer = TabletopScorer(task, observer=ObserverModel.in_metres(**options))
     options = {k: v for k, v in options.items() if k != "prefix"} | {
         "fractions": sorted(options["prefix"]) if "prefix" in options else None
     }
@@ -114,7 +116,7 @@ def test_what_the_columns_task_can_reach():
     rng = np.random.default_rng(0)
     genomes = np.zeros((2000, 32))
     genomes[:, :16] = rng.uniform((0.10, 0.20), (0.80, 0.70), (2000, 8, 2)).reshape(2000, 16)
-    found = scorer.genomes(genomes).legibility
+    found = scorer.score_genomes(genomes).legibility
     assert (found < 20).all()
     assert 6 < found.mean() < 7  # random tables
 
@@ -129,7 +131,7 @@ def test_two_goals_by_hand():
             excess = math.dist(home, q) + math.dist(q, other) - math.dist(home, other)
             p = 1 / (1 + math.exp(-20 * excess))
             legible += (p - (1 - p)) / 10
-    scores = TabletopScorer(task).layout(task.layout)
+    scores = TabletopScorer(task).score_layouts([task.layout])
     assert scores.legibility[0] == pytest.approx(legible, abs=1e-12)
     assert scores.distance[0] == pytest.approx(math.dist(home, (0.4, 0.4)), abs=1e-12)
     assert scores.mean_detour[0] == scores.max_detour[0] == 1
@@ -137,7 +139,7 @@ def test_two_goals_by_hand():
 
 def test_one_goal_is_certain():
     task = reach_task("only")
-    assert TabletopScorer(task).layout(task.layout).legibility[0] == pytest.approx(1, abs=1e-12)
+    assert TabletopScorer(task).score_layouts([task.layout]).legibility[0] == pytest.approx(1, abs=1e-12)
 
 
 @pytest.mark.parametrize(("ties", "wrong"), [("expected", 0.5), ("strict", 1.0)])
@@ -151,7 +153,7 @@ def test_goals_in_one_line_tie_until_the_nearer_one(ties, wrong):
         else:
             excess = 2 * (f * 0.5 - 0.25)
             far += (1 - math.exp(-20 * excess)) / (1 + math.exp(-20 * excess)) / 10
-    found = TabletopScorer(task, ties=ties).layout(task.layout).legibility[0]
+    found = TabletopScorer(task, observer=ObserverModel.in_metres(ties=ties)).score_layouts([task.layout]).legibility[0]
     assert found == pytest.approx(near + far, abs=1e-12)
 
 
@@ -164,7 +166,7 @@ def test_goals_behind_one_corner_tie_until_the_corner():
     length = layout.paths.lengths([layout.place("home")])[0, 0]
     early = [f for f in MIDPOINTS if f * length < first_leg]
     assert len(early) >= 2
-    found = TabletopScorer(task, prefix=early).layout(layout).legibility[0]
+    found = TabletopScorer(task, observer=ObserverModel.in_metres(prefix=early)).score_layouts([layout]).legibility[0]
     lengths = layout.paths.lengths([layout.place("home")])[0]
     assert found == pytest.approx(-0.5 * sum(f * sum(lengths) / 0.05 for f in early) / len(early), abs=1e-12)
 
@@ -174,7 +176,7 @@ def test_an_obstacle_can_make_a_reach_legible():
     between = task.layout.with_obstacles([VirtualObstacle((0.6, 0.35), math.pi / 2)])
     # A wall between two goals that are straight ahead: neither way is barred, one is told from the other no earlier.
     scorer = TabletopScorer(task)
-    plain, walled = scorer.layout(task.layout), scorer.layout(between)
+    plain, walled = scorer.score_layouts([task.layout]), scorer.score_layouts([between])
     assert walled.legibility[0] == pytest.approx(legibility(between, task.graph), abs=1e-9)
     assert walled.legibility[0] != plain.legibility[0]
 
@@ -184,9 +186,9 @@ def test_obstacles_out_of_every_way_and_doubled_ones_change_nothing():
     scorer = TabletopScorer("columns", max_obstacles=8)
     for layout, scores in valid_layouts(COLUMNS, rng, scorer, 10, max_obstacles=3):
         doubled = layout.with_obstacles([*layout.obstacles, *layout.obstacles])
-        np.testing.assert_allclose(np.array(scorer.layout(doubled)), np.array(scores), rtol=0, atol=1e-12)
+        np.testing.assert_allclose(np.array(scorer.score_layouts([doubled])), np.array(scores), rtol=0, atol=1e-12)
         far = layout.with_obstacles([*layout.obstacles, VirtualObstacle((-3.0, 3.0))])
-        np.testing.assert_allclose(np.array(scorer.layout(far)), np.array(scores), rtol=0, atol=1e-12)
+        np.testing.assert_allclose(np.array(scorer.score_layouts([far])), np.array(scores), rtol=0, atol=1e-12)
 
 
 def test_distance_is_that_of_all_legs_and_detours_those_of_reaches():
@@ -218,10 +220,10 @@ def test_genomes_score_like_their_layouts_in_any_batch():
     layouts = [random_layout(COLUMNS, rng) for _ in range(60)]
     genomes = np.array([layout.to_genome() for layout in layouts])
     order = rng.permutation(60)
-    together = np.array(scorer.genomes(genomes))
-    one_by_one = np.hstack([np.array(scorer.layout(layout)) for layout in layouts])
+    together = np.array(scorer.score_genomes(genomes))
+    one_by_one = np.hstack([np.array(scorer.score_layouts([layout])) for layout in layouts])
     np.testing.assert_allclose(together, one_by_one, rtol=0, atol=1e-12)
-    assert np.array_equal(np.array(scorer.genomes(genomes[order])), together[:, order], equal_nan=True)
+    assert np.array_equal(np.array(scorer.score_genomes(genomes[order])), together[:, order], equal_nan=True)
     assert 0 < np.isnan(together[0]).sum() < 60
     assert np.array_equal(np.isnan(together), np.isnan(together[[0, 0, 0, 0]]))
 
@@ -234,7 +236,7 @@ def test_inactive_obstacles_take_any_place_in_the_genome():
     rows[:] = rows[[2, 1, 3, 0]]
     rows[rows[:, 0] == 0, 1:] = 0.45
     scorer = TabletopScorer("columns")
-    scores = np.array(scorer.genomes([genome, shuffled]))
+    scores = np.array(scorer.score_genomes([genome, shuffled]))
     np.testing.assert_allclose(scores[:, 0], scores[:, 1], rtol=0, atol=1e-12)
 
 
@@ -245,7 +247,7 @@ def test_covered_or_walled_in_objects_have_no_score():
     start = layout.with_obstacles([VirtualObstacle((1.0, 0.45))])
     wall = layout.with_obstacles([VirtualObstacle((0.85, 0.4), math.pi / 2, (0.8, 0.01))])
     for broken in (covered, start, wall):
-        assert np.isnan(np.array(scorer.layout(broken))).all()
+        assert np.isnan(np.array(scorer.score_layouts([broken]))).all()
         assert not broken.is_valid()
 
 
@@ -255,7 +257,7 @@ def test_genomes_that_are_not_finite_score_nan_and_leave_the_others_alone(entry,
     scorer = TabletopScorer("columns")
     genomes = np.array([COLUMNS.layout.to_genome()] * 3)
     genomes[1, entry] = value
-    scores = np.array(scorer.genomes(genomes))
+    scores = np.array(scorer.score_genomes(genomes))
     assert np.isnan(scores[:, 1]).all()
     assert np.isfinite(scores[:, [0, 2]]).all()
 
@@ -263,16 +265,16 @@ def test_genomes_that_are_not_finite_score_nan_and_leave_the_others_alone(entry,
 @pytest.mark.parametrize("shape", [(32,), (2, 31), (2, 33), (1, 2, 32)])
 def test_genomes_of_another_shape_are_refused(shape):
     with pytest.raises(LayoutError, match=r"expected genomes of shape \(n, 32\)"):
-        TabletopScorer("columns").genomes(np.zeros(shape))
+        TabletopScorer("columns").score_genomes(np.zeros(shape))
 
 
 def test_no_genomes_have_no_scores():
-    assert TabletopScorer("columns").genomes(np.zeros((0, 32))).legibility.shape == (0,)
+    assert TabletopScorer("columns").score_genomes(np.zeros((0, 32))).legibility.shape == (0,)
 
 
 def test_layouts_of_another_task_are_refused():
     with pytest.raises(LayoutError, match="task 'columns' is about"):
-        TabletopScorer("columns").layout(TabletopTask.named("tea").layout)
+        TabletopScorer("columns").score_layouts([TabletopTask.named("tea").layout])
 
 
 @pytest.mark.parametrize(
@@ -286,13 +288,50 @@ def test_layouts_of_another_task_are_refused():
         ({"prefix": (0.0, 0.5)}, "prefix must be 'mean'"),
         ({"prefix": ()}, "prefix must be 'mean'"),
         ({"ties": "first"}, "ties"),
-        ({"max_obstacles": -1}, "max_obstacles"),
-        ({"obstacle_size": (0.3,)}, "obstacle_size"),
     ],
+)
+def test_wrong_settings_of_the_observer_are_named(options, message):
+    with pytest.raises(ValueError, match=message):
+        TabletopScorer("columns", observer=ObserverModel.in_metres(**options))
+    with pytest.raises(ValueError, match=message):
+        TabletopWorkspace(**options)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"), [({"max_obstacles": -1}, "max_obstacles"), ({"obstacle_size": (0.3,)}, "obstacle_size")]
 )
 def test_wrong_parameters_are_named(options, message):
     with pytest.raises(ValueError, match=message):
         TabletopScorer("columns", **options)
+
+
+@pytest.mark.parametrize("options", [{}, {"prefix": (0.2, 0.9), "beta": 7.0, "c": 2.0, "ties": "strict", "unit": 0.1}])
+def test_the_scorer_and_the_functions_say_the_same_of_a_layout(options):
+    observer = ObserverModel.in_metres(**options)
+    for task in (COLUMNS, sorting_task()):
+        scorer = TabletopScorer(task, observer=observer)
+        for layout, scores in valid_layouts(task, np.random.default_rng(12), scorer, 3):
+            found = scorer.score_layout(layout)
+            assert (found["score"], found["max_detour"]) == (scores.legibility[0], scores.max_detour[0])
+            defined = score_layout(layout, task, observer=observer)
+            assert list(found) == list(defined)
+            for key, value in defined.items():
+                assert found[key] == (pytest.approx(value, abs=1e-9) if isinstance(value, float) else value), key
+            rows = scorer.explain_layout(layout)
+            assert rows == explain_layout(layout, task, observer=observer)
+            assert math.fsum(row["contribution"] for row in rows) == pytest.approx(defined["score"])
+            single = math.fsum(row["contribution"] for row in rows if len(row["goals"]) == 1)
+            assert single == pytest.approx(defined["single_goal_score"])
+
+
+def test_one_layout_without_a_score_says_why():
+    wall = COLUMNS.layout.with_obstacles([VirtualObstacle((0.85, 0.4), math.pi / 2, (0.8, 0.01))])
+    for score in (TabletopScorer().score_layout, TabletopScorer().explain_layout, score_layout, explain_layout):
+        with pytest.raises(LayoutError, match=r"no path from \S+ to \S+") as caught:
+            score(wall)
+        assert caught.value.rule == "reachable"
+        with pytest.raises(LayoutError, match="task 'columns' is about"):
+            score(TabletopTask.named("tea").layout)
 
 
 def test_too_many_goals_at_once_are_refused():
@@ -315,7 +354,7 @@ def test_kernels_run_as_plain_python():
         "from legible_envs.tabletop import VirtualObstacle;"
         "s = TabletopScorer('tea');"
         "o = [VirtualObstacle((0.45, 0.2), 0.3), VirtualObstacle((0.85, 0.5), 1.5)];"
-        "print(*[float(x[0]) for x in s.layout(s.task.layout.with_obstacles(o))])"
+        "print(*[float(x[0]) for x in s.score_layouts([s.task.layout.with_obstacles(o)])])"
     )
     outcomes = [[float(word) for word in text.split()] for text in printed_both_ways(code)]
     assert outcomes[0] == pytest.approx(outcomes[1], abs=1e-12)

@@ -326,7 +326,7 @@ def test_captions_are_the_scores_of_the_layouts() -> None:
     from legible_envs.tabletop.rendering.panels import _caption
     from legible_envs.tabletop.scoring.scorer import TabletopScorer
 
-    scores = TabletopScorer(TASK).layout(WALLED)
+    scores = TabletopScorer(TASK).score_layouts([WALLED])
     assert f"legibility {scores.legibility[0]:.2f}" in _caption(WALLED, TASK, None).replace("\u2212", "-")
     assert f"mean detour {scores.mean_detour[0]:.2f}" in _caption(WALLED, TASK, None)
 

@@ -16,7 +16,8 @@ from legible_envs.tabletop import TableObject, TabletopLayout, TabletopTask, Tab
 from legible_envs.tabletop.design.genome_kernels import half_turn
 from legible_envs.tabletop.design.measures import greatest_spacing, least_distances, order_ranks
 from legible_envs.tasks import Subtask, TaskGraph
-from legible_envs.workspace import check_workspace, make_workspace
+from legible_envs.workspace import make_workspace
+from legible_envs.workspace_checks import check_workspace
 from tests.oracles.table_oracle import legibility
 from tests.support.plain_python import printed_both_ways
 
