@@ -7,84 +7,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from legible_envs.overcooked.game.dynamics import walkable
-from legible_envs.overcooked.game.vectors import AT_PLAYERS, HEIGHT, INTERACT, STAY, WIDTH, Kitchen, Vector
-from legible_envs.overcooked.humans.kernels import Way, beside, choose_step, find_costs, look_around
-from legible_envs.overcooked.layout import OBSTACLE
+from legible_envs.overcooked.game.vectors import AT_PLAYERS, HEIGHT, INTERACT, SOFT, STAY, WIDTH, Kitchen, Vector
+from legible_envs.overcooked.grid_kernels import costs_to, neighbour, steps_from
+from legible_envs.overcooked.humans.kernels import Way, choose_action, choose_step, look_around
+from legible_envs.overcooked.layout import FLOOR, OBSTACLE
 
 if TYPE_CHECKING:
     from legible_envs.overcooked.humans.walker import Walker
 
+__all__ = ["ScriptedPlayer", "WalkingPlayer"]
 
-from legible_envs.overcooked.game.dynamics import neighbour
-from legible_envs.support.compiled import kernel
-
-__all__ = ["ScriptedPlayer", "WalkingPlayer", "choose_action", "find_distances"]
-
-
-@kernel
-def find_distances(goal: int, kitchen: Kitchen, rules: Vector, avoid: bool, distances: npt.NDArray[np.int32]) -> None:
-    """Write the steps from every cell to one beside the goal.
-
-    Args:
-        goal: Flat cell of a station or counter.
-        kitchen: See ``vectors``.
-        rules: See ``vectors``.
-        avoid: Whether to keep off virtual obstacles, even those that can be crossed.
-        distances: ``(H*W,)``, written; -1 where there is no way.
-    """
-    queue = np.empty(rules[HEIGHT] * rules[WIDTH], dtype=np.int32)
-    distances[:] = -1
-    head, tail = 0, 0
-    for direction in range(4):
-        cell = neighbour(goal, direction, rules)
-        if cell >= 0 and walkable(kitchen[cell], rules) and not (avoid and kitchen[cell] == OBSTACLE):
-            distances[cell] = 0
-            queue[tail] = cell
-            tail += 1
-    while head < tail:
-        cell = queue[head]
-        head += 1
-        for direction in range(4):
-            beside = neighbour(cell, direction, rules)
-            if beside < 0 or distances[beside] >= 0 or not walkable(kitchen[beside], rules):
-                continue
-            if not (avoid and kitchen[beside] == OBSTACLE):
-                distances[beside] = distances[cell] + 1
-                queue[tail] = beside
-                tail += 1
-
-
-@kernel
-def choose_action(
-    state: Vector, rules: Vector, goal: int, distances: npt.NDArray[np.int32], can_interact: bool, chance: float
-) -> int:
-    """Next action on a shortest path to the goal; STAY beside a pot that is not ready yet.
-
-    Args:
-        state: See ``vectors``.
-        rules: See ``vectors``.
-        goal: Flat cell of the goal.
-        distances: Made by :func:`find_distances` for this goal.
-        can_interact: Whether INTERACT would do something now.
-        chance: Number in [0, 1) that picks one of the equally good steps.
-    """
-    cell = state[AT_PLAYERS]
-    options = np.empty(4, dtype=np.int64)
-    count = 0
-    for direction in range(4):
-        beside = neighbour(cell, direction, rules)
-        if distances[cell] == 0:
-            if beside == goal:
-                if state[AT_PLAYERS + 1] != direction:
-                    return direction
-                return INTERACT if can_interact else STAY
-        elif beside >= 0 and 0 <= distances[beside] < distances[cell]:
-            options[count] = direction
-            count += 1
-    if count == 0:
-        return STAY
-    return int(options[int(chance * count)])
+Flags = npt.NDArray[np.bool_]
 
 
 class ScriptedPlayer:
@@ -118,10 +51,11 @@ class ScriptedPlayer:
         self.avoid_obstacles = avoid_obstacles
         self.num_envs: int | None = getattr(env.unwrapped, "num_envs", None)
         count = self.num_envs or 1
-        self._width = 1
+        self._height = self._width = 1
         self._goals = [-1] * count
         self._layout_ids = [""] * count
-        self._distances: list[npt.NDArray[np.int32] | None] = [None] * count
+        self._floors: list[tuple[Flags, Flags] | None] = [None] * count
+        self._steps: list[npt.NDArray[np.int32] | None] = [None] * count
 
     def __call__(self, obs: Any, info: dict[str, Any]) -> Any:
         """The next action, an integer; for a vector environment ``(N,)`` integers.
@@ -150,14 +84,16 @@ class ScriptedPlayer:
         choices = np.flatnonzero(marked)
         if not len(choices):
             return False
-        self._layout_ids[index] = layout_id
+        if layout_id != self._layout_ids[index]:
+            self._layout_ids[index] = layout_id
+            self._floors[index] = None
         self._goals[index] = int(self.rng.choice(choices))
         self._forget_way(index)
         return True
 
     def _forget_way(self, index: int) -> None:
         """The goal of a game is a new one."""
-        self._distances[index] = None
+        self._steps[index] = None
 
     def _act(
         self,
@@ -168,26 +104,37 @@ class ScriptedPlayer:
         layout_id: str,
     ) -> int:
         state, kitchen, rules = arrays
-        self._width = int(rules[WIDTH])
         if not self._has_goal(index, valid_goals, layout_id):
             return STAY
-        distances = self._distances[index]
-        if distances is None or distances[state[AT_PLAYERS]] < 0:
-            distances = self._distances[index] = self._find_way(self._goals[index], state, kitchen, rules)
-        action = choose_action(
-            state, rules, self._goals[index], distances, bool(action_mask[INTERACT]), float(self.rng.random())
-        )
+        cell, facing = int(state[AT_PLAYERS]), int(state[AT_PLAYERS + 1])
+        goal, steps = self._goals[index], self._steps[index]
+        if steps is None or steps[cell] < 0:
+            steps = self._steps[index] = self._find_steps(index, cell, kitchen, rules)
+        can_interact = bool(action_mask[INTERACT])
+        action = choose_action(cell, facing, goal, steps, self._height, self._width, can_interact, self.rng.random())
         if action == INTERACT:
             self._goals[index] = -1
         return int(action)
 
-    def _find_way(self, goal: int, state: Vector, kitchen: Kitchen, rules: Vector) -> npt.NDArray[np.int32]:
-        distances = np.empty(int(rules[HEIGHT] * rules[WIDTH]), dtype=np.int32)
-        find_distances(goal, kitchen, rules, self.avoid_obstacles, distances)
-        if self.avoid_obstacles and distances[state[AT_PLAYERS]] < 0:
-            # Standing on an obstacle, or shut in by them: the only way leads across.
-            find_distances(goal, kitchen, rules, False, distances)
-        return distances
+    def _find_steps(self, index: int, cell: int, kitchen: Kitchen, rules: Vector) -> npt.NDArray[np.int32]:
+        """``(H*W,)`` fewest moves from the goal's cell, over obstacles only where no other path leads."""
+        floors = self._find_floors(index, kitchen, rules)
+        goal, steps = np.array([self._goals[index]]), np.empty(self._height * self._width, dtype=np.int32)
+        for floor in floors if self.avoid_obstacles else floors[1:]:
+            steps_from(goal, floor, self._height, self._width, steps)
+            if steps[cell] >= 0:
+                break
+        return steps
+
+    def _find_floors(self, index: int, kitchen: Kitchen, rules: Vector) -> tuple[Flags, Flags]:
+        """``(H*W,)`` where the player can stand off virtual obstacles, and where at all."""
+        found = self._floors[index]
+        if found is None:
+            self._height, self._width = int(rules[HEIGHT]), int(rules[WIDTH])
+            codes = kitchen[: self._height * self._width]
+            clear = codes == FLOOR
+            found = self._floors[index] = clear, (clear | (codes == OBSTACLE)) if rules[SOFT] else clear
+        return found
 
 
 class WalkingPlayer(ScriptedPlayer):
@@ -231,13 +178,15 @@ class WalkingPlayer(ScriptedPlayer):
         layout_id: str,
     ) -> int:
         state, kitchen, rules = arrays
-        self._width = int(rules[WIDTH])
         if not self._has_goal(index, valid_goals, layout_id):
             return STAY
         cell, facing = int(state[AT_PLAYERS]), int(state[AT_PLAYERS + 1])
         walk = self._walks[index]
         if walk is None or not walk.leads_from(cell):
-            walk = self._walks[index] = _Walk(self.walker, cell, self._goals[index], kitchen, rules)
+            floors = self._find_floors(index, kitchen, rules)
+            walk = self._walks[index] = _Walk(
+                self.walker, cell, self._goals[index], floors, (self._height, self._width)
+            )
         chance = self.rng.random()
         if chance < self.walker.idle:
             return STAY
@@ -245,7 +194,7 @@ class WalkingPlayer(ScriptedPlayer):
             towards = walk.look_around(cell, self.rng.random())
             return STAY if towards < 0 else towards
         direction = walk.next_direction(cell, self.walker, self.rng)
-        if beside(cell, direction, walk.way.height, walk.way.width) != self._goals[index] or facing != direction:
+        if neighbour(cell, direction, self._height, self._width) != self._goals[index] or facing != direction:
             return direction
         if not action_mask[INTERACT]:
             return STAY
@@ -256,18 +205,19 @@ class WalkingPlayer(ScriptedPlayer):
 class _Walk:
     """One person's way to one goal in a running game, and what was decided on it."""
 
-    def __init__(self, walker: Walker, cell: int, goal: int, kitchen: Kitchen, rules: Vector) -> None:
-        height, width = int(rules[HEIGHT]), int(rules[WIDTH])
-        codes = kitchen[: height * width]
-        self._open = np.array([walkable(code, rules) for code in codes])
-        self._memory = np.zeros(len(codes))
+    def __init__(
+        self, walker: Walker, cell: int, goal: int, floors: tuple[Flags, Flags], shape: tuple[int, int]
+    ) -> None:
+        height, width = shape
+        self._open = floors[1]
+        self._memory = np.zeros(height * width)
         self._weights = np.empty(4)
         self._heading = -1
         self._decided: tuple[int, int] | None = None
-        costs = walker.costs((height, width)).ravel()
-        best = np.empty(len(codes))
-        for floor in (self._open & (codes != OBSTACLE), self._open):
-            find_costs(height, width, floor, costs, goal, best)
+        costs = walker.costs(shape).ravel()
+        best = np.empty(height * width)
+        for floor in floors:
+            costs_to(goal, floor, costs, height, width, best)
             self.way = Way(height, width, floor, costs, goal, best)
             # Standing on an obstacle, or shut in by them, the only way leads across.
             if self.leads_from(cell):

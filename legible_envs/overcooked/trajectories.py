@@ -10,7 +10,8 @@ import numpy.typing as npt
 
 from legible_envs.errors import LayoutError
 from legible_envs.overcooked.game.view import GameView
-from legible_envs.overcooked.layout import INGREDIENTS, Cell, OvercookedLayout
+from legible_envs.overcooked.grid import NEIGHBOURS, Cell
+from legible_envs.overcooked.layout import INGREDIENTS, OvercookedLayout
 from legible_envs.rollouts.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -21,7 +22,6 @@ __all__ = ["ValidGoals", "Walk", "dispensers_in_reach", "find_walks", "record_ep
 ValidGoals = Callable[[int, int], "Collection[str]"]
 """Goals that are valid in the running game, called with (tick, player)."""
 
-_STEPS: Final = ((-1, 0), (1, 0), (0, 1), (0, -1))
 _STARTS: Final = ("pot", "serving")
 _GOALS: Final = (*INGREDIENTS, "dish")
 _KINDS: Final = {kind: code for code, kind in enumerate((*INGREDIENTS, "dish", "soup"), 1)}
@@ -76,7 +76,7 @@ def find_walks(
 
 
 def _faced(layout: OvercookedLayout, cell: Sequence[int], facing: int) -> str | None:
-    step = _STEPS[facing]
+    step = NEIGHBOURS[facing]
     return layout.station_at((int(cell[0]) + step[0], int(cell[1]) + step[1]))
 
 

@@ -15,7 +15,8 @@ from legible_envs.errors import LayoutError
 from legible_envs.legibility import PrefixSpec, Ties, check_prefix
 from legible_envs.overcooked.design import genome_kernels as kernels
 from legible_envs.overcooked.design.rules import DesignRules
-from legible_envs.overcooked.layout import INGREDIENTS, STATION_TYPES, Cell, OvercookedLayout
+from legible_envs.overcooked.grid import Cell
+from legible_envs.overcooked.layout import INGREDIENTS, STATION_TYPES, OvercookedLayout
 from legible_envs.overcooked.recipes import PAPER_SOUPS, check_recipes, soup_task
 from legible_envs.overcooked.scoring import explanation as scoring
 from legible_envs.overcooked.scoring.boltzmann import check_human

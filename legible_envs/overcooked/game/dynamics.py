@@ -32,10 +32,8 @@ from legible_envs.overcooked.game.vectors import (
     DISH,
     DISH_CELL,
     DISHES_OUT,
-    EAST,
     HEIGHT,
     INTERACT,
-    NORTH,
     NOTHING_HAPPENS,
     NUM_ORDERS,
     NUM_PLAYERS,
@@ -53,7 +51,6 @@ from legible_envs.overcooked.game.vectors import (
     SOFT,
     SOUP,
     SOUPS_IN_POTS,
-    SOUTH,
     STATE_SIZE,
     STAY,
     STEPS,
@@ -62,23 +59,11 @@ from legible_envs.overcooked.game.vectors import (
     Kitchen,
     Vector,
 )
+from legible_envs.overcooked.grid_kernels import neighbour
 from legible_envs.overcooked.layout import COUNTER, FLOOR, OBSTACLE
 from legible_envs.support.compiled import kernel
 
 # -- the floor plan ---------------------------------------------------------------------------------------------------
-
-
-@kernel
-def neighbour(cell: int, direction: int, rules: Vector) -> int:
-    """Flat cell next to ``cell`` in a direction; -1 outside the grid."""
-    width = rules[WIDTH]
-    if direction == NORTH:
-        return cell - width if cell >= width else -1
-    if direction == SOUTH:
-        return cell + width if cell + width < rules[HEIGHT] * width else -1
-    if direction == EAST:
-        return cell + 1 if cell % width < width - 1 else -1
-    return cell - 1 if cell % width > 0 else -1
 
 
 @kernel
@@ -105,7 +90,7 @@ def label_regions(kitchen: Kitchen, rules: Vector) -> None:
             height -= 1
             cell = stack[height]
             for direction in range(4):
-                following = neighbour(cell, direction, rules)
+                following = neighbour(cell, direction, rules[HEIGHT], rules[WIDTH])
                 if following >= 0 and kitchen[cells + following] == 0 and walkable(kitchen[following], rules):
                     kitchen[cells + following] = label
                     stack[height] = following
@@ -117,7 +102,7 @@ def usable(cell: int, region: int, kitchen: Kitchen, rules: Vector) -> bool:
     """Whether a player of this region can stand next to the cell."""
     cells = rules[HEIGHT] * rules[WIDTH]
     for direction in range(4):
-        beside = neighbour(cell, direction, rules)
+        beside = neighbour(cell, direction, rules[HEIGHT], rules[WIDTH])
         if beside >= 0 and kitchen[cells + beside] == region:
             return True
     return False
@@ -223,7 +208,7 @@ def interaction(state: Vector, kitchen: Kitchen, rules: Vector, player: int) -> 
     """What INTERACT would do for a player now: one of the constants ``NOTHING_HAPPENS`` to ``DELIVERS``."""
     at = AT_PLAYERS + 3 * player
     held = state[at + 2]
-    target = neighbour(state[at], state[at + 1], rules)
+    target = neighbour(state[at], state[at + 1], rules[HEIGHT], rules[WIDTH])
     if target < 0:
         return NOTHING_HAPPENS
     code = kitchen[target]
@@ -276,7 +261,7 @@ def interact(state: Vector, kitchen: Kitchen, rules: Vector, player: int) -> int
         return what
     at = AT_PLAYERS + 3 * player
     held = state[at + 2]
-    target = neighbour(state[at], state[at + 1], rules)
+    target = neighbour(state[at], state[at + 1], rules[HEIGHT], rules[WIDTH])
     if what == TAKES:
         state[at + 2] = kitchen[target] - 2
         if kitchen[target] == DISH_CELL:
@@ -331,7 +316,7 @@ def _target(state: Vector, kitchen: Kitchen, rules: Vector, player: int, action:
     if action >= STAY:
         return cell
     state[at + 1] = action
-    target = neighbour(cell, action, rules)
+    target = neighbour(cell, action, rules[HEIGHT], rules[WIDTH])
     return target if target >= 0 and walkable(kitchen[target], rules) else cell
 
 

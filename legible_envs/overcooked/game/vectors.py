@@ -28,10 +28,6 @@ import numpy.typing as npt
 Vector = npt.NDArray[np.int32]
 Kitchen = npt.NDArray[np.int16]
 
-NORTH: Final = 0
-SOUTH: Final = 1
-EAST: Final = 2
-WEST: Final = 3
 STAY: Final = 4
 INTERACT: Final = 5
 

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from legible_envs.overcooked.humans.kernels import Way, beside, find_costs, is_option
+from legible_envs.overcooked.grid_kernels import costs_to, neighbour
+from legible_envs.overcooked.humans.kernels import Way, is_option
 from legible_envs.overcooked.layout import FLOOR, OvercookedLayout
 from legible_envs.rollouts.trajectory import Trajectory
 
@@ -168,7 +169,7 @@ def _collect(walks: Sequence[Trajectory], names: Sequence[str], cell_costs: npt.
         way = ways[key]
         cells = [int(row) * way.width + int(col) for row, col in walk.states.tolist()]
         for i, (before, after) in enumerate(itertools.pairwise(cells)):
-            options = [beside(before, direction, way.height, way.width) for direction in range(4)]
+            options = [neighbour(before, direction, way.height, way.width) for direction in range(4)]
             if not way.floor[before] or after not in options or not is_option(after, way):
                 (a, b), (c, d) = divmod(before, way.width), divmod(after, way.width)
                 raise ValueError(
@@ -206,7 +207,7 @@ def make_way(layout: OvercookedLayout, station: Sequence[int], cell_costs: npt.A
         raise ValueError("cell costs of floor cells must be finite and greater than 0")
     best = np.empty(height * width)
     target = int(station[0]) * width + int(station[1])
-    find_costs(height, width, floor, costs.ravel(), target, best)
+    costs_to(target, floor, costs.ravel(), height, width, best)
     return Way(height, width, floor, costs.ravel(), target, best)
 
 

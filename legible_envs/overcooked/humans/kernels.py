@@ -12,14 +12,16 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from legible_envs.overcooked.game.vectors import INTERACT, STAY
+from legible_envs.overcooked.grid_kernels import neighbour
 from legible_envs.support.compiled import kernel
 
 __all__ = [
     "BOLTZMANN",
     "PLANNER",
     "Way",
+    "choose_action",
     "choose_step",
-    "find_costs",
     "look_around",
     "sample_times",
     "sample_walk",
@@ -54,42 +56,6 @@ class Way(NamedTuple):
 
 
 @kernel
-def beside(cell: int, direction: int, height: int, width: int) -> int:
-    """The neighbouring cell, -1 outside the grid."""
-    row, col = cell // width, cell % width
-    if direction == 0:
-        return cell - width if row > 0 else -1
-    if direction == 1:
-        return cell + width if row < height - 1 else -1
-    if direction == 2:
-        return cell + 1 if col < width - 1 else -1
-    return cell - 1 if col > 0 else -1
-
-
-@kernel
-def find_costs(height: int, width: int, floor: Flags, costs: Floats, station: int, best: Floats) -> None:
-    """Write to ``best [n]`` the least cost from each floor cell into a station (Bellman and Ford).
-
-    Stepping on a cell costs what ``costs`` says, the last step into the station 1.
-    """
-    best[:] = np.inf
-    changed = True
-    while changed:
-        changed = False
-        for cell in range(len(floor)):
-            if not floor[cell]:
-                continue
-            for direction in range(4):
-                after = beside(cell, direction, height, width)
-                if after < 0:
-                    continue
-                cost = 1.0 if after == station else costs[after] + best[after]
-                if cost < best[cell]:
-                    best[cell] = cost
-                    changed = True
-
-
-@kernel
 def is_option(after: int, way: Way) -> bool:
     """Whether a person on the way may step there: into the goal, or onto floor from which it can be reached."""
     return after >= 0 and (after == way.station or (way.floor[after] and way.best[after] < np.inf))
@@ -113,7 +79,7 @@ def draw_direction(weights: Floats, chance: float) -> int:
 def boltzmann_weights(cell: int, way: Way, rationality: float, weights: Floats) -> None:
     """Write to ``weights [4]`` the odds of each step of the local softmax."""
     for direction in range(4):
-        after = beside(cell, direction, way.height, way.width)
+        after = neighbour(cell, direction, way.height, way.width)
         weights[direction] = np.inf
         if is_option(after, way):
             weights[direction] = 1.0 if after == way.station else way.costs[after] + way.best[after]
@@ -142,7 +108,7 @@ def plan_cost(cell: int, heading: int, plan: int, way: Way, memory: Floats, numb
     for _ in range(int(numbers[0])):
         direction = plan % 4
         plan //= 4
-        cell = beside(cell, direction, way.height, way.width)
+        cell = neighbour(cell, direction, way.height, way.width)
         if not is_option(cell, way):
             return np.inf
         if heading >= 0 and direction != heading:
@@ -165,11 +131,11 @@ def planner_weights(cell: int, heading: int, way: Way, memory: Floats, numbers: 
     least = cheapest.min()
     options, best = 0, 0
     for direction in range(4):
-        options += is_option(beside(cell, direction, way.height, way.width), way)
+        options += is_option(neighbour(cell, direction, way.height, way.width), way)
         best += cheapest[direction] <= least + 1e-9
     for direction in range(4):
         weights[direction] = 0.0
-        if is_option(beside(cell, direction, way.height, way.width), way):
+        if is_option(neighbour(cell, direction, way.height, way.width), way):
             weights[direction] = numbers[4] / options
             if least == np.inf:
                 weights[direction] = 1.0 / options
@@ -216,7 +182,7 @@ def sample_walk(
     path[0] = start
     for length in range(1, len(path)):
         heading = choose_step(kind, numbers, cell, heading, way, memory, rng.random(), weights)
-        cell = beside(cell, heading, way.height, way.width)
+        cell = neighbour(cell, heading, way.height, way.width)
         path[length] = cell
         if cell == way.station:
             return length + 1
@@ -228,16 +194,56 @@ def look_around(cell: int, height: int, width: int, floor: Flags, chance: float)
     """A direction in which nobody can walk, each equally likely; -1 where there is none."""
     count = 0
     for direction in range(4):
-        after = beside(cell, direction, height, width)
+        after = neighbour(cell, direction, height, width)
         count += after < 0 or not floor[after]
     pick = int(chance * count)
     for direction in range(4):
-        after = beside(cell, direction, height, width)
+        after = neighbour(cell, direction, height, width)
         if after < 0 or not floor[after]:
             if pick == 0:
                 return direction
             pick -= 1
     return -1
+
+
+@kernel
+def choose_action(
+    cell: int,
+    facing: int,
+    goal: int,
+    steps: npt.NDArray[np.int32],
+    height: int,
+    width: int,
+    can_interact: bool,
+    chance: float,
+) -> int:
+    """Next action on a shortest path to a goal; STAY beside a pot that is not ready yet, and where no path leads.
+
+    Args:
+        cell: Where the player stands.
+        facing: Direction faced.
+        goal: Cell of the goal.
+        steps: ``[n]`` fewest moves from the goal's cell; -1 where no path leads.
+        height: Rows of the grid.
+        width: Columns of the grid.
+        can_interact: Whether INTERACT would do something now.
+        chance: Number in [0, 1) that picks one of the equally good steps.
+    """
+    options = np.empty(4, dtype=np.int64)
+    count = 0
+    for direction in range(4):
+        after = neighbour(cell, direction, height, width)
+        if steps[cell] == 1:
+            if after == goal:
+                if facing != direction:
+                    return direction
+                return INTERACT if can_interact else STAY
+        elif after >= 0 and 0 <= steps[after] < steps[cell]:
+            options[count] = direction
+            count += 1
+    if count == 0:
+        return STAY
+    return int(options[int(chance * count)])
 
 
 @kernel
@@ -271,7 +277,7 @@ def sample_times(
     ticks[0] = 0
     for i in range(1, len(path)):
         direction = 0
-        while beside(path[i - 1], direction, way.height, way.width) != path[i]:
+        while neighbour(path[i - 1], direction, way.height, way.width) != path[i]:
             direction += 1
         waited, facing = dawdle(path[i - 1], facing, way, idle, turn, rng)
         ticks[i] = ticks[i - 1] + waited + 1
@@ -304,7 +310,7 @@ def step_probabilities(
         planner_weights(cell, heading, way, memory, numbers, weights)
         options, taken = 0, 0
         for direction in range(4):
-            after = beside(cell, direction, way.height, way.width)
+            after = neighbour(cell, direction, way.height, way.width)
             options += is_option(after, way)
             if after == path[i + 1]:
                 taken = direction

@@ -11,9 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.errors import LayoutError
+from legible_envs.overcooked.grid import Cell
+from legible_envs.overcooked.grid_kernels import neighbour
 from legible_envs.overcooked.humans.fitting import make_way
-from legible_envs.overcooked.humans.kernels import Way, beside, sample_times, sample_walk
-from legible_envs.overcooked.layout import Cell, OvercookedLayout
+from legible_envs.overcooked.humans.kernels import Way, sample_times, sample_walk
+from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.rollouts.trajectory import Trajectory
 from legible_envs.support.validation import check_finite
 
@@ -183,7 +185,7 @@ class Walker(ABC):
         way = self._way(layout, goal)
         path = self._walk(way, cell, rng)
         row, col = layout.stations[start]
-        around = [beside(int(path[0]), direction, way.height, way.width) for direction in range(4)]
+        around = [neighbour(int(path[0]), direction, way.height, way.width) for direction in range(4)]
         facing = around.index(row * way.width + col)
         ticks = np.empty(len(path), dtype=np.int64)
         sample_times(path, facing, way, self.idle, self.turn, rng, ticks)
