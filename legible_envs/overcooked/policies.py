@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from legible_envs.overcooked.game.vectors import AT_PLAYERS, HEIGHT, INTERACT, SOFT, STAY, WIDTH, Kitchen, Vector
 from legible_envs.overcooked.grid_kernels import costs_to, neighbour, steps_from
-from legible_envs.overcooked.humans.kernels import Way, choose_action, choose_step, look_around
+from legible_envs.overcooked.humans.kernels import GoalField, choose_action, choose_step, look_around
 from legible_envs.overcooked.layout import FLOOR, OBSTACLE
 
 if TYPE_CHECKING:
@@ -65,20 +65,18 @@ class ScriptedPlayer:
             info: The info returned with it.
         """
         if self.num_envs is None:
-            return self._act(
-                0, self.env.unwrapped.arrays(), info["valid_goals"], info["action_mask"], info["layout_id"]
-            )
+            return self._act(0, self.env.unwrapped.arrays(), info["goal_mask"], info["action_mask"], info["layout_id"])
         arrays = self.env.call("arrays")
-        keys = ("valid_goals", "action_mask", "layout_id")
+        keys = ("goal_mask", "action_mask", "layout_id")
         return np.array([self._act(i, arrays[i], *(info[key][i] for key in keys)) for i in range(self.num_envs)])
 
     def goal(self, index: int = 0) -> tuple[int, int] | None:
         """``(row, col)`` of the goal walked to in a game, None between goals."""
         return None if self._goals[index] < 0 else divmod(self._goals[index], self._width)
 
-    def _has_goal(self, index: int, valid_goals: npt.NDArray[np.bool_], layout_id: str) -> bool:
+    def _has_goal(self, index: int, goal_mask: npt.NDArray[np.bool_], layout_id: str) -> bool:
         """Whether there is something to walk to; where the last goal is no longer valid, another is drawn."""
-        marked = valid_goals.ravel()
+        marked = goal_mask.ravel()
         if layout_id == self._layout_ids[index] and self._goals[index] >= 0 and marked[self._goals[index]]:
             return True
         choices = np.flatnonzero(marked)
@@ -99,12 +97,12 @@ class ScriptedPlayer:
         self,
         index: int,
         arrays: tuple[Vector, Kitchen, Vector],
-        valid_goals: npt.NDArray[np.bool_],
+        goal_mask: npt.NDArray[np.bool_],
         action_mask: npt.NDArray[np.int8],
         layout_id: str,
     ) -> int:
         state, kitchen, rules = arrays
-        if not self._has_goal(index, valid_goals, layout_id):
+        if not self._has_goal(index, goal_mask, layout_id):
             return STAY
         cell, facing = int(state[AT_PLAYERS]), int(state[AT_PLAYERS + 1])
         goal, steps = self._goals[index], self._steps[index]
@@ -151,7 +149,7 @@ class WalkingPlayer(ScriptedPlayer):
         >>> import gymnasium as gym, legible_envs, numpy as np
         >>> from legible_envs.overcooked.humans import BoltzmannWalker
         >>> env = gym.make("LegibleOvercooked-v0", max_episode_steps=5000)
-        >>> player = BoltzmannWalker(rationality=1.3).policy(env, np.random.default_rng(0))
+        >>> player = WalkingPlayer(env, BoltzmannWalker(rationality=1.3), np.random.default_rng(0))
         >>> obs, info = env.reset(seed=0)
         >>> over = False
         >>> while not over:
@@ -173,12 +171,12 @@ class WalkingPlayer(ScriptedPlayer):
         self,
         index: int,
         arrays: tuple[Vector, Kitchen, Vector],
-        valid_goals: npt.NDArray[np.bool_],
+        goal_mask: npt.NDArray[np.bool_],
         action_mask: npt.NDArray[np.int8],
         layout_id: str,
     ) -> int:
         state, kitchen, rules = arrays
-        if not self._has_goal(index, valid_goals, layout_id):
+        if not self._has_goal(index, goal_mask, layout_id):
             return STAY
         cell, facing = int(state[AT_PLAYERS]), int(state[AT_PLAYERS + 1])
         walk = self._walks[index]
@@ -187,10 +185,10 @@ class WalkingPlayer(ScriptedPlayer):
             walk = self._walks[index] = _Walk(
                 self.walker, cell, self._goals[index], floors, (self._height, self._width)
             )
-        chance = self.rng.random()
-        if chance < self.walker.idle:
+        u = self.rng.random()
+        if u < self.walker.idle:
             return STAY
-        if chance < self.walker.idle + self.walker.turn:
+        if u < self.walker.idle + self.walker.turn:
             towards = walk.look_around(cell, self.rng.random())
             return STAY if towards < 0 else towards
         direction = walk.next_direction(cell, self.walker, self.rng)
@@ -215,19 +213,19 @@ class _Walk:
         self._heading = -1
         self._decided: tuple[int, int] | None = None
         costs = walker.costs(shape).ravel()
-        best = np.empty(height * width)
+        cost_to_go = np.empty(height * width)
         for floor in floors:
-            costs_to(goal, floor, costs, height, width, best)
-            self.way = Way(height, width, floor, costs, goal, best)
+            costs_to(goal, floor, costs, height, width, cost_to_go)
+            self.field = GoalField(height, width, floor, costs, goal, cost_to_go)
             # Standing on an obstacle, or shut in by them, the only way leads across.
             if self.leads_from(cell):
                 break
 
     def leads_from(self, cell: int) -> bool:
-        return bool(self.way.best[cell] < np.inf)
+        return bool(self.field.cost_to_go[cell] < np.inf)
 
-    def look_around(self, cell: int, chance: float) -> int:
-        return int(look_around(cell, self.way.height, self.way.width, self._open, chance))
+    def look_around(self, cell: int, u: float) -> int:
+        return int(look_around(cell, self.field.height, self.field.width, self._open, u))
 
     def next_direction(self, cell: int, walker: Walker, rng: np.random.Generator) -> int:
         """Decide once at each cell: a person who turns to the goal does not think again before using it."""
@@ -237,7 +235,7 @@ class _Walk:
             if not self.leads_from(cell):
                 return STAY
             direction = choose_step(
-                walker.kind, walker.numbers, cell, self._heading, self.way, self._memory, rng.random(), self._weights
+                walker.kind, walker.params, cell, self._heading, self.field, self._memory, rng.random(), self._weights
             )
             self._decided = cell, int(direction)
         return self._decided[1]

@@ -159,7 +159,7 @@ def simulate(cell: dict[str, Any]) -> list[Trajectory]:
         OvercookedLayout.from_ascii(cell["drawing"]),
         cell["participants"],
         np.random.default_rng(cell["seed"]),
-        walker=draw_person(cell["people"]),
+        population=draw_person(cell["people"]),
         participant=label,
         condition=cell["condition"],
         layout_name=label,

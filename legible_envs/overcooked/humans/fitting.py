@@ -11,11 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.overcooked.grid_kernels import costs_to, neighbour
-from legible_envs.overcooked.humans.kernels import Way, is_option
+from legible_envs.overcooked.humans.kernels import GoalField, is_option
 from legible_envs.overcooked.layout import FLOOR, OvercookedLayout
 from legible_envs.rollouts.trajectory import Trajectory
 
-__all__ = ["RationalityFit", "RationalitySpread", "fit_rationality", "make_way", "rationality_spread"]
+__all__ = ["RationalityFit", "RationalitySpread", "fit_rationality", "goal_field", "rationality_spread"]
 
 Floats = npt.NDArray[np.float64]
 
@@ -158,27 +158,27 @@ def rationality_spread(
 
 
 def _collect(walks: Sequence[Trajectory], names: Sequence[str], cell_costs: npt.ArrayLike | None) -> _Steps:
-    ways: dict[tuple[object, str], Way] = {}
+    fields: dict[tuple[object, str], GoalField] = {}
     excess, taken, who = [], [], []
     for number, walk in enumerate(walks):
         if not isinstance(walk.layout, OvercookedLayout) or walk.goal is None or not walk.is_grid:
             raise ValueError(f"walk {number} has no kitchen, no goal, or positions instead of cells")
         key = walk.layout, walk.goal
-        if key not in ways:
-            ways[key] = make_way(walk.layout, walk.layout.stations[walk.goal], cell_costs)
-        way = ways[key]
-        cells = [int(row) * way.width + int(col) for row, col in walk.states.tolist()]
+        if key not in fields:
+            fields[key] = goal_field(walk.layout, walk.layout.stations[walk.goal], cell_costs)
+        field = fields[key]
+        cells = [int(row) * field.width + int(col) for row, col in walk.states.tolist()]
         for i, (before, after) in enumerate(itertools.pairwise(cells)):
-            options = [neighbour(before, direction, way.height, way.width) for direction in range(4)]
-            if not way.floor[before] or after not in options or not is_option(after, way):
-                (a, b), (c, d) = divmod(before, way.width), divmod(after, way.width)
+            options = [neighbour(before, direction, field.height, field.width) for direction in range(4)]
+            if not field.floor[before] or after not in options or not is_option(after, field):
+                (a, b), (c, d) = divmod(before, field.width), divmod(after, field.width)
                 raise ValueError(
                     f"walk {number}: the step after state {i}, from row {a}, column {b} to row {c}, column {d}, is "
                     f"not to a neighbouring floor cell or into {walk.goal!r}"
                 )
-            costs = np.array([_cost(option, way) for option in options])
+            costs = np.array([_cost(option, field) for option in options])
             excess.append(costs - costs.min())
-            taken.append(_cost(after, way) - costs.min())
+            taken.append(_cost(after, field) - costs.min())
             who.append(names.index(walk.participant))
     table = np.array(excess).reshape(-1, 4)
     if not len(table) or not (np.isfinite(table).sum(axis=1) > 1).any():
@@ -186,14 +186,19 @@ def _collect(walks: Sequence[Trajectory], names: Sequence[str], cell_costs: npt.
     return _Steps(table, np.array(taken), np.array(who, dtype=np.intp))
 
 
-def _cost(cell: int, way: Way) -> float:
-    if not is_option(cell, way):
+def _cost(cell: int, field: GoalField) -> float:
+    if not is_option(cell, field):
         return math.inf
-    return 1.0 if cell == way.station else float(way.costs[cell] + way.best[cell])
+    return 1.0 if cell == field.station else float(field.costs[cell] + field.cost_to_go[cell])
 
 
-def make_way(layout: OvercookedLayout, station: Sequence[int], cell_costs: npt.ArrayLike | None = None) -> Way:
-    """The way to a station of a layout for the kernels.
+def goal_field(layout: OvercookedLayout, station: Sequence[int], cell_costs: npt.ArrayLike | None = None) -> GoalField:
+    """The costs to go to a station of a layout, for the kernels.
+
+    Args:
+        layout: The kitchen.
+        station: ``(row, col)`` of the station.
+        cell_costs: ``(H, W)`` cost of stepping on each cell; 1 if None.
 
     Raises:
         ValueError: Costs of another shape, or costs of floor cells that are not positive and finite.
@@ -205,10 +210,10 @@ def make_way(layout: OvercookedLayout, station: Sequence[int], cell_costs: npt.A
         raise ValueError(f"cell costs must have the kitchen's shape {layout.shape}, got {costs.shape}")
     if not np.isfinite(costs.ravel()[floor]).all() or (costs.ravel()[floor] <= 0).any():
         raise ValueError("cell costs of floor cells must be finite and greater than 0")
-    best = np.empty(height * width)
+    cost_to_go = np.empty(height * width)
     target = int(station[0]) * width + int(station[1])
-    costs_to(target, floor, costs.ravel(), height, width, best)
-    return Way(height, width, floor, costs.ravel(), target, best)
+    costs_to(target, floor, costs.ravel(), height, width, cost_to_go)
+    return GoalField(height, width, floor, costs.ravel(), target, cost_to_go)
 
 
 def _fit(steps: _Steps, confidence: float, num_walks: int, num_participants: int) -> RationalityFit:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from legible_envs.overcooked.humans.fitting import fit_rationality, make_way, rationality_spread
-from legible_envs.overcooked.humans.kernels import Way
+from legible_envs.overcooked.humans.fitting import fit_rationality, goal_field, rationality_spread
+from legible_envs.overcooked.humans.kernels import GoalField
 from legible_envs.overcooked.humans.simulation import BoltzmannWalker, PlannerWalker, Walker
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["PlannerFit", "best_slip", "draw_person", "fit_boltzmann", "fit_planner"]
 
 Floats = npt.NDArray[np.float64]
-Recorded = list[tuple[npt.NDArray[np.int64], Way, str]]
+Recorded = list[tuple[npt.NDArray[np.int64], GoalField, str]]
 
 GRID: Final[Mapping[str, tuple[float, ...]]] = {
     "depth": (2, 3, 4),
@@ -147,30 +147,30 @@ def best_slip(planned: Floats, slipped: Floats) -> tuple[float, float]:
 
 
 def _prepared(walks: Sequence[Trajectory]) -> Recorded:
-    """Paths as cell numbers, the way to each goal, and who walked."""
+    """Paths as cell numbers, the costs to go to each goal, and the participant."""
     from legible_envs.overcooked.layout import OvercookedLayout
 
-    ways: dict[tuple[object, str], Way] = {}
+    fields: dict[tuple[object, str], GoalField] = {}
     found: Recorded = []
     for walk in walks:
         if not isinstance(walk.layout, OvercookedLayout) or walk.goal is None:
             raise ValueError("walks to fit people on need a kitchen and a goal")
         key = walk.layout, walk.goal
-        if key not in ways:
-            ways[key] = make_way(walk.layout, walk.layout.stations[walk.goal])
+        if key not in fields:
+            fields[key] = goal_field(walk.layout, walk.layout.stations[walk.goal])
         path = walk.states[:, 0].astype(np.int64) * walk.layout.shape[1] + walk.states[:, 1]
-        found.append((path.astype(np.int64), ways[key], walk.participant))
+        found.append((path.astype(np.int64), fields[key], walk.participant))
     return found
 
 
-def _step_probabilities(recorded: Recorded, numbers: Floats) -> tuple[Floats, Floats]:
+def _step_probabilities(recorded: Recorded, params: Floats) -> tuple[Floats, Floats]:
     """``(m,)`` each of all steps of all walks, as :func:`step_probabilities` gives them."""
     from legible_envs.overcooked.humans.kernels import step_probabilities
 
     ends = np.cumsum([0, *(len(path) - 1 for path, *_ in recorded)])
     planned, slipped = np.empty(ends[-1]), np.empty(ends[-1])
-    for (path, way, _), a, b in zip(recorded, ends, ends[1:], strict=False):
-        step_probabilities(path, way, numbers, planned[a:b], slipped[a:b])
+    for (path, field, _), a, b in zip(recorded, ends, ends[1:], strict=False):
+        step_probabilities(path, field, params, planned[a:b], slipped[a:b])
     return planned, slipped
 
 
@@ -178,7 +178,7 @@ def draw_person(people: Mapping[str, Any]) -> Callable[..., Walker]:
     """What draws a person for :func:`~legible_envs.overcooked.humans.simulate_participants`.
 
     Args:
-        people: Plain data: ``walker`` and its numbers, as :func:`benchmarks.experiments.overcooked.sweep.people_of`
+        people: Plain data: ``walker`` and its parameters, as :func:`benchmarks.experiments.overcooked.sweep.people_of`
             makes them. Boltzmann people have lognormal rationality; planners the cost of turning and the slips of one
             recorded person each, drawn at random.
     """
@@ -194,8 +194,8 @@ def draw_person(people: Mapping[str, Any]) -> Callable[..., Walker]:
 
         def draw(shape: tuple[int, int], rng: np.random.Generator) -> Walker:
             turn_cost, slip = people["people"][int(rng.integers(len(people["people"])))]
-            numbers = {key: people[key] for key in ("depth", "recency", "fade")}
-            return PlannerWalker.draw(shape, rng, preference=preference, turn_cost=turn_cost, slip=slip, **numbers)
+            shared = {key: people[key] for key in ("depth", "recency", "fade")}
+            return PlannerWalker.draw(shape, rng, preference=preference, turn_cost=turn_cost, slip=slip, **shared)
 
     else:
         raise ValueError(f"people are 'boltzmann' or 'planner', got {kind!r}")

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, Final, Literal, get_args
+from typing import Any, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -80,7 +80,7 @@ class BoltzmannWalker(Walker):
         self.rationality = check_finite("rationality", rationality, minimum=0.0)
 
     @property
-    def numbers(self) -> Floats:
+    def params(self) -> Floats:
         """``[rationality]``."""
         return np.array([self.rationality])
 
@@ -159,7 +159,7 @@ class PlannerWalker(Walker):
             raise ValueError(f"fade must be in [0, 1) and slip in [0, 1], got {fade!r} and {slip!r}")
 
     @property
-    def numbers(self) -> Floats:
+    def params(self) -> Floats:
         """``[depth, turn_cost, recency, fade, slip]``."""
         return np.array([self.depth, self.turn_cost, self.recency, self.fade, self.slip])
 
@@ -186,8 +186,8 @@ class PlannerWalker(Walker):
         return cls(preferences=draw_preferences(shape, rng, preference), **{**drawn, **arguments})
 
 
-WalkerName = Literal["boltzmann", "planner"]
-_WALKERS: Final[dict[str, Any]] = {"boltzmann": BoltzmannWalker.draw, "planner": PlannerWalker.draw}
+PopulationName = Literal["boltzmann", "planner"]
+_POPULATIONS: Final[dict[str, Any]] = {"boltzmann": BoltzmannWalker.draw, "planner": PlannerWalker.draw}
 
 
 def simulate_participants(
@@ -195,8 +195,8 @@ def simulate_participants(
     n: int,
     rng: np.random.Generator,
     *,
-    walker: WalkerName | Callable[..., Walker] = "boltzmann",
     task: TaskGraph | None = None,
+    population: PopulationName | Callable[..., Walker] | None = None,
     executions: int = 1,
     participant: str = "person",
     condition: str = "simulated",
@@ -213,25 +213,27 @@ def simulate_participants(
 
     Args:
         layout: The kitchen.
-        n: Number of people.
+        n: Number of participants.
         rng: Source of all randomness.
-        walker: ``"boltzmann"`` or ``"planner"`` people, drawn anew for each participant, or what draws one, called with
-            (shape, rng).
         task: The task over station types; the paper's three soups if None.
-        executions: How often each person does the task.
+        population: What participants are drawn from, each anew: ``"boltzmann"`` (also None) or ``"planner"``, or a
+            callable that makes one participant's walker, called with (shape, rng).
+        executions: How often each participant does the task.
         participant: Names are ``"{participant}/0"``, ``"{participant}/1"``, ….
         condition: Of all trajectories.
         layout_name: Of all trajectories.
-        **settings: Of the people: see :meth:`BoltzmannWalker.draw` and :meth:`PlannerWalker.draw`.
+        **settings: Of the population: arguments of :meth:`BoltzmannWalker.draw` or :meth:`PlannerWalker.draw`.
 
     Raises:
         LayoutError: The task cannot be done in this kitchen.
-        ValueError: Unknown walkers.
+        ValueError: Unknown population.
     """
     task = task or soup_task()
-    if isinstance(walker, str) and walker not in _WALKERS:
-        raise ValueError(f"walker must be one of {list(get_args(WalkerName))} or a callable, got {walker!r}")
-    draw = _WALKERS[walker] if isinstance(walker, str) else walker
+    if population is None:
+        population = "boltzmann"
+    if isinstance(population, str) and population not in _POPULATIONS:
+        raise ValueError(f"`population` must be one of {list(_POPULATIONS)} or a callable, got {population!r}")
+    draw = _POPULATIONS[population] if isinstance(population, str) else population
     found: list[Trajectory] = []
     for number in range(n):
         person = draw(layout.shape, rng, **settings)
