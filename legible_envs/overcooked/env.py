@@ -249,13 +249,14 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
         """
         try:
             self._actions[0] = action
-            valid = 0 <= self._actions[0] < NUM_ACTIONS and self._actions[0] == action
+            move = self._actions.item()
+            valid = 0 <= move < NUM_ACTIONS and move == action
         except (TypeError, ValueError, OverflowError):
             valid = False
         if not valid:
             raise ValueError(f"expected an action 0..{NUM_ACTIONS - 1}, got {action!r}")
         mask = np.empty(NUM_ACTIONS, dtype=np.int8)
-        self._log.append(self._actions.item())
+        self._log.append(move)
         reward, over, changed = batch.play(
             self._state, self._kitchen, self._rules, self.settings.weights, self._actions, self._goals, mask
         )
@@ -316,7 +317,7 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
         return draw_small(self.view())
 
     def _info(self, mask: npt.NDArray[np.int8]) -> dict[str, Any]:
-        deliveries = int(self._state[DELIVERIES])
+        deliveries = self._state.item(DELIVERIES)
         return {
             "goals": self._goal_names,
             "goal_mask": self._goals.reshape(self.settings.shape).copy(),
@@ -324,7 +325,7 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
             "layout_id": self._packed.layout.layout_id,
             "num_done": deliveries,
             "deliveries": deliveries,
-            "crossings": int(self._state[CROSSINGS]),
+            "crossings": self._state.item(CROSSINGS),
         }
 
     # -- what people and programs ask ---------------------------------------------------------------------------------

@@ -229,6 +229,15 @@ class OvercookedLayout:
             for kind, (r, c) in zip(kinds, found, strict=True)
         }
 
+    @cached_property
+    def goal_names(self) -> tuple[str, ...]:
+        """Name of each cell as a goal, in reading order: the station's on it, else ``counter@(row,col)``."""
+        height, width = self.shape
+        names = [f"counter@({row},{col})" for row in range(height) for col in range(width)]
+        for name, (row, col) in self.stations.items():
+            names[row * width + col] = name
+        return tuple(names)
+
     def named(self, kind: str) -> tuple[str, ...]:
         """Names of all stations of one type, in reading order."""
         return tuple(name for name in self.stations if name.partition("@")[0] == kind)

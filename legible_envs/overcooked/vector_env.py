@@ -170,12 +170,14 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
         count = self.num_envs
         ends = np.empty((2, count), dtype=np.bool_)
         outcome = Outcome(np.empty((count, NUM_ACTIONS), dtype=np.int8), np.empty(count), ends[0], ends[1])
-        self._ended = batch.play_all(games, self.settings.weights, self.max_episode_steps or 0, moves, outcome)
-        infos: Infos = {}
+        limit = self.max_episode_steps or 0
+        self._ended = batch.play_all(*games, self.settings.weights, limit, moves, *outcome)
+        final: Infos = {}
         if self._ended and self.autoreset_mode == AutoresetMode.SAME_STEP:
-            infos = self._finish(games.done, outcome.masks)
+            final = self._finish(games.done, outcome.masks)
             self._restart(games.done, outcome.masks)
-        infos.update(self._infos(outcome.masks))
+        infos = self._infos(outcome.masks)
+        infos.update(final)
         if self.render_mode == "human":
             self.render()
         return self._observe(), outcome.rewards, outcome.terminated, outcome.truncated, infos
@@ -373,34 +375,33 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
         return masks
 
     def _observe(self) -> npt.NDArray[Any]:
-        obs_type = self.settings.obs_type
+        games, obs_type = self._games, self.settings.obs_type
         if obs_type == "grid":
-            batch.refresh_grids(self._games, self._grids)
+            batch.refresh_grids(games.states, games.kitchens, games.rules, games.drawn, self._grids)
             return self._grids.copy()
         if obs_type == "vector":
             features = np.zeros(self._observations_shape, dtype=np.float32)
-            batch.vector_observations(self._games, self._routes, features)
+            batch.vector_observations(games.states, games.kitchens, games.rules, self._routes, features)
             return features
         return np.stack([draw_small(self.view(i)) for i in range(self.num_envs)])
 
     def _infos(self, masks: npt.NDArray[np.int8], which: npt.NDArray[np.bool_] | None = None) -> Infos:
         """The games' infos as ``SyncVectorEnv`` gathers them but for names; zeros (None) in games that have none."""
-        counts = np.ascontiguousarray(self._games.states[:, CROSSINGS : DELIVERIES + 1].T, dtype=np.int64)
-        infos: Infos = {}
-        for key, value in (
-            ("goal_mask", self._games.goals.copy().reshape(self._goals_shape)),
-            ("action_mask", masks),
-            ("layout_id", self._ids.copy()),
-            ("num_done", counts[1].copy()),
-            ("deliveries", counts[1]),
-            ("crossings", counts[0]),
-        ):
-            infos[key] = value
-            infos[f"_{key}"] = (self._everyone if which is None else which).copy()
+        states = self._games.states
+        done = states[:, DELIVERIES].astype(np.int64)
+        infos: Infos = {
+            "goal_mask": self._games.goals.copy().reshape(self._goals_shape),
+            "action_mask": masks,
+            "layout_id": self._ids.copy(),
+            "num_done": done,
+            "deliveries": done.copy(),
+            "crossings": states[:, CROSSINGS].astype(np.int64),
+        }
         if which is not None and not which.all():
-            for key in ("goal_mask", "action_mask", "num_done", "deliveries", "crossings"):
-                infos[key][~which] = 0
-            infos["layout_id"][~which] = None
+            for key, values in infos.items():
+                values[~which] = None if key == "layout_id" else 0
+        told = self._everyone if which is None else which
+        infos |= {"_" + key: told.copy() for key in infos}
         return infos
 
     def _finish(self, done: npt.NDArray[np.bool_], masks: npt.NDArray[np.int8]) -> Infos:

@@ -124,34 +124,55 @@ class Outcome(NamedTuple):
 
 @kernel
 def play_all(
-    games: Batch, weights: npt.NDArray[np.float64], limit: int, actions: npt.NDArray[np.int64], outcome: Outcome
+    states: Vectors,
+    kitchens: npt.NDArray[np.int16],
+    rules: Vector,
+    goals: npt.NDArray[np.bool_],
+    drawn: Vector,
+    done: npt.NDArray[np.bool_],
+    weights: npt.NDArray[np.float64],
+    limit: int,
+    actions: npt.NDArray[np.int64],
+    masks: npt.NDArray[np.int8],
+    rewards: npt.NDArray[np.float64],
+    terminated: npt.NDArray[np.bool_],
+    truncated: npt.NDArray[np.bool_],
 ) -> int:
     """Advance ``N`` single-player games by one tick, or start them anew; returns how many ended.
 
+    Called as ``play_all(*games, weights, limit, actions, *outcome)`` with a :class:`Batch` and an :class:`Outcome`:
+    the compiler's wrapper takes 2 microseconds longer to look into a named tuple, a twentieth of a tick of 64 games.
+
     Args:
-        games: The games, changed in place.
+        states: See :class:`Batch`, as the next five; changed in place.
+        kitchens: Not changed.
+        rules: Not changed.
+        goals: Brought up to date.
+        drawn: Set to -1 where more has changed than :func:`refresh_grids` looks for.
+        done: Whether to start the game anew instead; then whether it ended.
         weights: ``(5,)`` rewards; see :func:`~legible_envs.overcooked.game.dynamics.step`.
         limit: Steps after which a game is truncated; 0 means never.
         actions: ``(N, 1)`` actions; ignored where a game starts anew.
-        outcome: Written.
+        masks: See :class:`Outcome`, as the next three; written.
+        rewards: Written.
+        terminated: Written.
+        truncated: Written.
     """
-    states, rules, goals, masks = games.states, games.rules, games.goals, outcome.masks
     ended = 0
     for i in range(states.shape[0]):
-        if games.done[i]:
-            begin(states[i], games.kitchens[i], rules, goals[i], masks[i])
-            outcome.rewards[i] = 0.0
-            outcome.terminated[i] = outcome.truncated[i] = games.done[i] = False
-            games.drawn[i] = -1
+        if done[i]:
+            begin(states[i], kitchens[i], rules, goals[i], masks[i])
+            rewards[i] = 0.0
+            terminated[i] = truncated[i] = done[i] = False
+            drawn[i] = -1
             continue
-        reward, over, changed = play(states[i], games.kitchens[i], rules, weights, actions[i], goals[i], masks[i])
+        rewards[i], over, changed = play(states[i], kitchens[i], rules, weights, actions[i], goals[i], masks[i])
         if changed:
-            games.drawn[i] = -1
-        outcome.rewards[i] = reward
-        outcome.terminated[i] = over
-        outcome.truncated[i] = 0 < limit <= states[i, STEPS]
-        games.done[i] = outcome.terminated[i] or outcome.truncated[i]
-        if games.done[i]:
+            drawn[i] = -1
+        terminated[i] = over
+        truncated[i] = 0 < limit <= states[i, STEPS]
+        done[i] = terminated[i] or truncated[i]
+        if done[i]:
             ended += 1
     return ended
 
@@ -182,22 +203,30 @@ def play_back(
 
 
 @kernel
-def refresh_grids(games: Batch, grids: npt.NDArray[np.uint8]) -> None:
-    """Bring the ``(N, H, W, C)`` grid observations of one tick ago up to date; ``games.drawn`` says how much is new."""
-    for i in range(games.states.shape[0]):
-        if games.drawn[i] < 0:
+def refresh_grids(
+    states: Vectors, kitchens: npt.NDArray[np.int16], rules: Vector, drawn: Vector, grids: npt.NDArray[np.uint8]
+) -> None:
+    """Bring the ``(N, H, W, C)`` grid observations of one tick ago up to date; see :class:`Batch` for the others."""
+    for i in range(states.shape[0]):
+        if drawn[i] < 0:
             grids[i] = 0
-            grid_observation(games.states[i], games.kitchens[i], games.rules, grids[i])
+            grid_observation(states[i], kitchens[i], rules, grids[i])
         else:
-            redraw_motion(games.states[i], games.rules, games.drawn[i], grids[i])
-        games.drawn[i] = games.states[i, AT_PLAYERS]
+            redraw_motion(states[i], rules, drawn[i], grids[i])
+        drawn[i] = states[i, AT_PLAYERS]
 
 
 @kernel
-def vector_observations(games: Batch, routes: npt.NDArray[np.int16], out: npt.NDArray[np.float32]) -> None:
+def vector_observations(
+    states: Vectors,
+    kitchens: npt.NDArray[np.int16],
+    rules: Vector,
+    routes: npt.NDArray[np.int16],
+    out: npt.NDArray[np.float32],
+) -> None:
     """Write the ``(N, D)`` vector observations of ``N`` games; ``routes`` ``(N, 7, 2, H*W)``, ``out`` zeros."""
-    for i in range(games.states.shape[0]):
-        vector_observation(games.states[i], games.kitchens[i], games.rules, routes[i], out[i])
+    for i in range(states.shape[0]):
+        vector_observation(states[i], kitchens[i], rules, routes[i], out[i])
 
 
 @kernel
