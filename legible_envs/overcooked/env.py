@@ -38,7 +38,7 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
     One cook fetches ingredients, puts them in a pot, waits, puts the soup on a dish and serves it, until every ordered
     soup is delivered: by default the three soups of Tung, Luebbers, Roncone and Hayes, *Workspace Optimization
     Techniques to Improve Prediction of Human Motion During Human-Robot Collaboration* (HRI 2024), each once and in any
-    order. Virtual obstacles are projected on the floor to make the cook's walks easier to read. The game follows
+    order. Virtual obstacles are projected on the floor so that the cook's goals are easier to predict. The game follows
     Overcooked-AI (actions and their order, turning in place, counters that hold one item, a cook time of 20), with
     three differences: recipes are data; a pot accepts only what can still become an ordered soup, and starts by itself
     when one is complete; and an ingredient or empty dish can be put back where it came from, so that no state is a dead
@@ -144,7 +144,7 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
             and delivered once.
         cook_time: Ticks a soup cooks.
         obs_type: `"grid"`, `"vector"` or `"rgb"`.
-        virtual_obstacles: `"hard"`: nobody walks over them; `"soft"`: they can be crossed, and crossings are counted.
+        virtual_obstacles: `"hard"`: they block the player; `"soft"`: they can be crossed, and crossings are counted.
         crossing_cost: What a crossing of a soft virtual obstacle costs.
         shaping: False, True, or a mapping of rewards; see Rewards.
         render_mode: None, `"human"` (a window), `"rgb_array"` or `"ansi"`.
@@ -328,7 +328,7 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
             "crossings": self._state.item(CROSSINGS),
         }
 
-    # -- what people and programs ask ---------------------------------------------------------------------------------
+    # -- questions to the game ---------------------------------------------------------------------------------------
 
     def view(self) -> GameView:
         """A snapshot of the game in words, for drawing."""

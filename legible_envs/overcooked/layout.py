@@ -277,7 +277,7 @@ class OvercookedLayout:
         return hashlib.sha256(self.to_ascii().encode()).hexdigest()[:12]
 
     def distances_from(self, cells: Iterable[Sequence[int]]) -> npt.NDArray[np.int32]:
-        """``(H, W)`` number of floor moves from the nearest of the given floor cells; -1 where there is no way."""
+        """``(H, W)`` number of floor moves from the nearest of the given floor cells; -1 where no path leads."""
         from legible_envs.overcooked.grid_kernels import steps_from  # layouts are read and written without numba
 
         height, width = self.shape

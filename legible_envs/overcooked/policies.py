@@ -1,4 +1,4 @@
-"""Policies for kitchens: a scripted cook who finishes every valid one, and simulated people at play."""
+"""Policies for kitchens, called with ``(observation, info)``: a scripted player, and simulated participants at play."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ Flags = npt.NDArray[np.bool_]
 class ScriptedPlayer:
     """Walks to a valid goal drawn uniformly, by a shortest path, uses it, and draws the next.
 
-    At every cell each step that shortens the way is equally likely. Soft virtual obstacles are kept off where there is
-    another way (see ``avoid_obstacles``). Reads the game from the environment, so it plays with every ``obs_type``,
-    under wrappers, and in vector environments.
+    At every cell each step along a shortest path is equally likely. Soft virtual obstacles are avoided where another
+    path leads to the goal (see ``avoid_obstacles``). Reads the game from the environment, so it plays with every
+    ``obs_type``, under wrappers, and in vector environments.
 
     Args:
         env: An environment made by ``gymnasium.make("LegibleOvercooked-v0")``, or a vector environment of such.
@@ -86,10 +86,10 @@ class ScriptedPlayer:
             self._layout_ids[index] = layout_id
             self._floors[index] = None
         self._goals[index] = int(self.rng.choice(choices))
-        self._forget_way(index)
+        self._forget_path(index)
         return True
 
-    def _forget_way(self, index: int) -> None:
+    def _forget_path(self, index: int) -> None:
         """The goal of a game is a new one."""
         self._steps[index] = None
 
@@ -138,7 +138,8 @@ class ScriptedPlayer:
 class WalkingPlayer(ScriptedPlayer):
     """Walks to a valid goal drawn uniformly as the walker does, uses it, and draws the next.
 
-    Idles and looks around as often as the walker says. Soft virtual obstacles are kept off where there is another way.
+    Idles and looks around as often as the walker says. Soft virtual obstacles are avoided where another
+    path leads to the goal.
 
     Args:
         env: An environment made by ``gymnasium.make("LegibleOvercooked-v0")``, or a vector environment of such.
@@ -164,7 +165,7 @@ class WalkingPlayer(ScriptedPlayer):
         self.walker = walker
         self._walks: list[_Walk | None] = [None] * len(self._goals)
 
-    def _forget_way(self, index: int) -> None:
+    def _forget_path(self, index: int) -> None:
         self._walks[index] = None
 
     def _act(
@@ -201,7 +202,7 @@ class WalkingPlayer(ScriptedPlayer):
 
 
 class _Walk:
-    """One person's way to one goal in a running game, and what was decided on it."""
+    """One person's path to one goal in a running game, and the last decision on it."""
 
     def __init__(
         self, walker: Walker, cell: int, goal: int, floors: tuple[Flags, Flags], shape: tuple[int, int]
@@ -217,7 +218,7 @@ class _Walk:
         for floor in floors:
             costs_to(goal, floor, costs, height, width, cost_to_go)
             self.field = GoalField(height, width, floor, costs, goal, cost_to_go)
-            # Standing on an obstacle, or shut in by them, the only way leads across.
+            # Standing on an obstacle, or shut in by them, the only path leads across.
             if self.leads_from(cell):
                 break
 

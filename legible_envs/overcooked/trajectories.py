@@ -1,4 +1,4 @@
-"""Finding the walks in an episode: empty-handed from a pot or serving station to an ingredient or dish."""
+"""Trajectories in an episode: empty-handed from a pot or serving station to an ingredient or dish station."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _KINDS: Final = {kind: code for code, kind in enumerate((*INGREDIENTS, "dish", "
 
 
 class Walk(NamedTuple):
-    """A walk of one player.
+    """One trajectory of one player, as cells and ticks.
 
     Attributes:
         start: Station whose use emptied the hands.
@@ -62,17 +62,17 @@ def find_walks(
     held: npt.NDArray[np.integer],
     start: str | None = None,
 ) -> Iterator[Walk]:
-    """The walks of one player through one episode.
+    """The trajectories of one player through one episode.
 
-    A walk begins when using a pot or serving station empties the hands, ends when an ingredient or dish station fills
-    them, and is dropped where anything else fills them in between.
+    A trajectory begins when using a pot or serving station empties the hands, ends when an ingredient or dish station
+    fills them, and is dropped where anything else fills them in between.
 
     Args:
         layout: The kitchen.
         cells: ``(T, 2)`` row and column, one state a tick.
         facing: ``(T,)`` 0 N, 1 S, 2 E, 3 W.
         held: ``(T,)`` item held, 0 for nothing.
-        start: Station where the player counts as standing at first; None drops a first walk that starts nowhere.
+        start: Station where the player counts as standing at first; None drops a first trajectory without a start.
     """
     origin: tuple[str, int] | None = (start, 0) if start is not None and held[0] == 0 else None
     for tick in np.flatnonzero(np.diff(held.astype(np.int64))).tolist():
@@ -122,7 +122,7 @@ def trajectories(
     round_trips: bool = True,
     **labels: Any,
 ) -> list[Trajectory]:
-    """Walks of all players as trajectories; arrays as in ``find_walks`` with a player axis after the first.
+    """The trajectories of all players; arrays as in ``find_walks`` with a player axis after the first.
 
     Args:
         layout: The kitchen.
@@ -132,11 +132,11 @@ def trajectories(
         seconds: ``(T,)`` time of each state.
         participants: ``n`` names.
         starts: ``n`` stations where players count as standing at first.
-        valid_goals: Goals of the running game; the candidates are then those in reach among them when the walk begins
-            (candidate set ``game``), and walks to other goals are left out. None: all in reach (``all``).
-        min_positions: Fewest floor cells of a walk.
-        min_candidates: Fewest candidates of a walk.
-        round_trips: Whether to keep walks that end on the cell they began on, because start and goal share it.
+        valid_goals: Goals of the running game; the candidates are then those in reach among them when it begins
+            (candidate set ``game``), and trajectories to other goals are left out. None: all in reach (``all``).
+        min_positions: Fewest floor cells of a trajectory.
+        min_candidates: Fewest candidates of a trajectory.
+        round_trips: Whether to keep trajectories that end on the cell they began on, because start and goal share it.
         labels: Further attributes of :class:`~legible_envs.rollouts.Trajectory`.
     """
     found = []
@@ -220,7 +220,7 @@ def trajectories_from_views(
     min_positions: int = 1,
     min_candidates: int = 1,
 ) -> list[Trajectory]:
-    """The walks in an episode, from the views of all its states in order.
+    """The trajectories in an episode, from the views of all its states in order.
 
     A player whose first cell is beside a serving station counts as standing at serving, where the task begins.
 
@@ -232,8 +232,8 @@ def trajectories_from_views(
         condition: Under which condition.
         layout_name: The kitchen's name, if it has one.
         seconds_per_tick: Length of a tick.
-        min_positions: Fewest floor cells of a walk.
-        min_candidates: Fewest candidates of a walk.
+        min_positions: Fewest floor cells of a trajectory.
+        min_candidates: Fewest candidates of a trajectory.
 
     Raises:
         ValueError: No view, views of different kitchens, or another number of goal lists than of views.

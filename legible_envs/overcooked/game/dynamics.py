@@ -9,7 +9,7 @@ A pot accepts an ingredient if afterwards every unfinished pot can still be comp
 soups on the fire, in hands or on counters are taken): two pots never commit to one order. It starts by itself when it
 holds a whole recipe. With ``put_back`` no state is a dead end for a single player: hands can always be emptied where
 they were filled, accepted ingredients and soups are always of use, and soups on counters can be picked up again.
-What remains: several players can stand in each other's way for ever, or, in a kitchen divided by counters, fill all
+What remains: several players can block each other for ever, or, in a kitchen divided by counters, fill all
 counters over which they hand things to each other with things that only the other side could use up.
 """
 
@@ -300,7 +300,7 @@ def _move_together(state: Vector, targets: Vector) -> None:
                     stuck[a] = stuck[b] = True
         blocked = False
         for player in range(targets.shape[0]):
-            # Whoever stays may now be in the way of another, so look again.
+            # A player who stays may now block another, so look again.
             if stuck[player] and targets[player] != state[AT_PLAYERS + 3 * player]:
                 targets[player] = state[AT_PLAYERS + 3 * player]
                 blocked = True
@@ -310,7 +310,7 @@ def _move_together(state: Vector, targets: Vector) -> None:
 
 @kernel
 def _target(state: Vector, kitchen: Kitchen, rules: Vector, player: int, action: int) -> int:
-    """Turn a player who moves, and return the cell he would stand on if no other player were there."""
+    """Turn a player who moves, and return the cell they would stand on if no other player were there."""
     at = AT_PLAYERS + 3 * player
     cell = state[at]
     if action >= STAY:

@@ -42,7 +42,7 @@ __all__ = ["find_actions", "find_goals", "missing_station"]
 
 @kernel
 def missing_station(kitchen: Kitchen, rules: Vector, player: int) -> int:
-    """Cell code of a station that the recipes need and the player cannot get to from his start; 0 if none."""
+    """Cell code of a station that the recipes need and the player cannot get to from their start; 0 if none."""
     cells = rules[HEIGHT] * rules[WIDTH]
     region = kitchen[cells + kitchen[2 * cells + player]]
     for code in range(OBSTACLE + 1, SERVING_CELL + 1):

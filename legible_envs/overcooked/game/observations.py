@@ -141,7 +141,7 @@ def find_routes(kitchen: Kitchen, rules: Vector, routes: npt.NDArray[np.int16]) 
         kitchen: See ``vectors``.
         rules: See ``vectors``.
         routes: ``(7, 2, H*W)``, written: for each station type the steps to a cell beside the nearest one, and the
-            cell of that station; -1 where there is no way.
+            cell of that station; -1 where no path leads.
     """
     cells = rules[HEIGHT] * rules[WIDTH]
     queue = np.empty(cells, dtype=np.int32)
@@ -174,7 +174,7 @@ def find_routes(kitchen: Kitchen, rules: Vector, routes: npt.NDArray[np.int16]) 
 def _describe_player(
     state: Vector, kitchen: Kitchen, rules: Vector, routes: npt.NDArray[np.int16], out: npt.NDArray[np.float32]
 ) -> None:
-    """Entries 0 to 37: where the player is, what he holds, where he can go and how far the stations are."""
+    """Entries 0 to 37: where the player is, what they hold, where they can go, and how far the stations are."""
     height, width = rules[HEIGHT], rules[WIDTH]
     cell = state[AT_PLAYERS]
     row, col = cell // width, cell % width

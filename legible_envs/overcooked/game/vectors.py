@@ -1,4 +1,4 @@
-"""The vectors that hold a game for the kernels: where in them things are, and the codes of things.
+"""The vectors that hold a game for the kernels: where each number is, and the codes of items.
 
 A game is three vectors, so that a batch of games is three matrices:
 

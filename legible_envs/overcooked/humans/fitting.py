@@ -37,7 +37,7 @@ class RationalityFit:
         confidence: Of the interval.
         log_likelihood: At the estimate.
         num_steps: Steps taken, the one into the station included.
-        num_walks: Trajectories.
+        num_trajectories: Trajectories.
         num_participants: Different participants.
     """
 
@@ -48,7 +48,7 @@ class RationalityFit:
     confidence: float
     log_likelihood: float
     num_steps: int
-    num_walks: int
+    num_trajectories: int
     num_participants: int
 
 
@@ -103,12 +103,12 @@ def fit_rationality(
     does not. The log-likelihood is concave, so the estimate is the only one.
 
     Args:
-        trajectories: Walks with a layout and a goal, consecutive repeats dropped.
+        trajectories: With a layout and a goal, consecutive repeats dropped.
         confidence: Of the interval, in (0, 1).
-        cell_costs: ``(H, W)`` cost of stepping on each cell, 1 if None; walks must then be of one shape of kitchen.
+        cell_costs: ``(H, W)`` cost of stepping on each cell, 1 if None; with costs, all kitchens must be of one shape.
 
     Raises:
-        ValueError: No step with a choice; a walk without layout or goal, that does not fit its layout, or that jumps.
+        ValueError: No step with a choice; a trajectory without layout or goal, that does not fit its layout, or that jumps.
 
     Example:
         >>> from legible_envs.overcooked import OvercookedLayout
@@ -127,17 +127,17 @@ def fit_rationality(
 
 
 def rationality_spread(
-    trajectories: Iterable[Trajectory], *, confidence: float = 0.95, min_walks: int = 10
+    trajectories: Iterable[Trajectory], *, confidence: float = 0.95, min_trajectories: int = 10
 ) -> RationalitySpread:
     """How much participants differ in rationality.
 
     Args:
-        trajectories: As for :func:`fit_rationality`; of one kitchen, or kitchens that everybody walked in.
+        trajectories: As for :func:`fit_rationality`; of one kitchen, or of kitchens that every participant walked in.
         confidence: Of each interval.
-        min_walks: Participants with fewer walks are left out.
+        min_trajectories: Participants with fewer trajectories are left out.
 
     Raises:
-        ValueError: Fewer than two participants with enough walks and an estimate that is neither 0 nor infinite.
+        ValueError: Fewer than two participants with enough trajectories and an estimate that is neither 0 nor infinite.
     """
     by_name: dict[str, list[Trajectory]] = {}
     for walk in trajectories:
@@ -145,11 +145,13 @@ def rationality_spread(
     fits = {
         name: fit_rationality(walks, confidence=confidence)
         for name, walks in sorted(by_name.items())
-        if len(walks) >= min_walks
+        if len(walks) >= min_trajectories
     }
     usable = [fit for fit in fits.values() if 0 < fit.rationality < math.inf]
     if len(usable) < 2:
-        raise ValueError(f"a spread needs two participants with {min_walks} walks each; got {len(usable)}")
+        raise ValueError(
+            f"a spread needs two participants with {min_trajectories} trajectories each; got {len(usable)}"
+        )
     logs = np.log([fit.rationality for fit in usable])
     errors = np.array([fit.standard_error / fit.rationality for fit in usable])
     variance = float(logs.var(ddof=1))
@@ -216,7 +218,7 @@ def goal_field(layout: OvercookedLayout, station: Sequence[int], cell_costs: npt
     return GoalField(height, width, floor, costs.ravel(), target, cost_to_go)
 
 
-def _fit(steps: _Steps, confidence: float, num_walks: int, num_participants: int) -> RationalityFit:
+def _fit(steps: _Steps, confidence: float, num_trajectories: int, num_participants: int) -> RationalityFit:
     from scipy.optimize import brentq
     from scipy.stats import chi2
 
@@ -247,5 +249,5 @@ def _fit(steps: _Steps, confidence: float, num_walks: int, num_participants: int
             correction = num_participants / (num_participants - 1)
             clustered = math.sqrt(correction * float((by_person**2).sum())) / float(information.sum())
     return RationalityFit(
-        best, (low, high), error, clustered, confidence, greatest, len(steps.taken), num_walks, num_participants
+        best, (low, high), error, clustered, confidence, greatest, len(steps.taken), num_trajectories, num_participants
     )

@@ -1,4 +1,4 @@
-"""Kernels of simulated people: where they step next, whole walks, and how long these take.
+"""Kernels of simulated participants: their next step, whole paths, and how long these take.
 
 Cells are flat indices of an ``H x W`` grid; directions are actions, 0 N, 1 S, 2 E, 3 W. How a person decides is a kind
 and a vector of parameters: ``BOLTZMANN`` ``[rationality]``, ``PLANNER`` ``[depth, turn_cost, recency, fade, slip]``.
@@ -191,7 +191,7 @@ def sample_walk(
 
 @kernel
 def look_around(cell: int, height: int, width: int, floor: Flags, u: float) -> int:
-    """A direction in which nobody can walk, each equally likely; -1 where there is none."""
+    """A direction in which no step is possible, each equally likely; -1 where there is none."""
     count = 0
     for direction in range(4):
         after = neighbour(cell, direction, height, width)
@@ -300,8 +300,8 @@ def step_probabilities(
         path: ``[T]`` cells, the goal's station last; each a step from the one before.
         field: Of the goal.
         params: ``[depth, turn_cost, recency, fade, 0]``.
-        planned: ``[T - 1]`` output: probability of the step for who never slips.
-        slipped: ``[T - 1]`` output: probability of the step for who steps anywhere.
+        planned: ``[T - 1]`` output: probability of the step without slips.
+        slipped: ``[T - 1]`` output: probability of the step where every step is a slip.
     """
     memory, weights = np.zeros(len(field.floor)), np.empty(4)
     heading = -1

@@ -29,11 +29,11 @@ GRID: Final[Mapping[str, tuple[float, ...]]] = {
     "fade": (0.5, 0.7, 0.8, 0.9, 0.95),
 }
 """Values of the planner's parameters that are tried. Costs decide what is best alone, not by how much: between two
-values of the grid the likelihood hardly changes, but in steps, so that nothing smooth could be climbed. Who looks one
-step ahead would fit the recorded kitchens, which have no dead ends, better still, and lose their way for hundreds of
-steps among virtual obstacles; two is the least."""
-MIN_WALKS: Final = 10
-"""Whoever walked less often is not fitted alone."""
+values of the grid the likelihood hardly changes, but in steps, so that nothing smooth could be climbed. A depth of one
+step would fit the recorded kitchens, which have no dead ends, better still, but such participants get lost for hundreds
+of steps among virtual obstacles; two is the least."""
+MIN_TRAJECTORIES: Final = 10
+"""Fewest trajectories of a participant who is fitted alone."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ def fit_boltzmann(walks: Sequence[Trajectory]) -> list[dict[str, Any]]:
         taken out, and the ``log_likelihood`` of all steps at one common rationality), with empty ``participant``; then
         one for each person with ``rationality``.
     """
-    spread = rationality_spread(walks, min_walks=MIN_WALKS)
+    spread = rationality_spread(walks, min_trajectories=MIN_TRAJECTORIES)
     common = fit_rationality(walks)
     whole = {
         "walker": "boltzmann",
@@ -78,24 +78,24 @@ def fit_boltzmann(walks: Sequence[Trajectory]) -> list[dict[str, Any]]:
         "spread": spread.sd,
         "log_likelihood": common.log_likelihood,
         "steps": common.num_steps,
-        "walks": common.num_walks,
+        "walks": common.num_trajectories,
         "people": common.num_participants,
     }
     each = [
-        {"walker": "boltzmann", "participant": name, "rationality": fit.rationality, "walks": fit.num_walks}
+        {"walker": "boltzmann", "participant": name, "rationality": fit.rationality, "walks": fit.num_trajectories}
         for name, fit in spread.fits.items()
     ]
     return [whole, *each]
 
 
 def fit_planner(walks: Sequence[Trajectory], grid: Mapping[str, Sequence[float]] = GRID) -> PlannerFit:
-    """Fit the planner to recorded walks.
+    """Fit the planner to recorded trajectories.
 
-    All parameters are fitted for everybody together, one after the other over a grid until none is better changed alone
-    (the rate of slips exactly, for each); then each person's own cost of turning and rate of slips.
+    All parameters are fitted for all participants together, one after the other over a grid until none is better
+    changed alone (the rate of slips exactly, for each); then each participant's own cost of turning and rate of slips.
 
     Args:
-        walks: Walks with a kitchen, a goal and a participant.
+        walks: Trajectories with a kitchen, a goal and a participant.
         grid: Values tried.
     """
     recorded = _prepared(walks)
@@ -121,7 +121,7 @@ def fit_planner(walks: Sequence[Trajectory], grid: Mapping[str, Sequence[float]]
     turning = [(turn, *steps({**best, "turn_cost": turn})) for turn in grid["turn_cost"]]
     people = {}
     for name, number in Counter(walk.participant for walk in walks).items():
-        if number >= MIN_WALKS:
+        if number >= MIN_TRAJECTORIES:
             own = [(turn, *best_slip(planned[who == name], slipped[who == name])) for turn, planned, slipped in turning]
             turn, own_slip, _ = max(own, key=lambda fit: fit[2])
             people[name] = (float(turn), own_slip)
@@ -134,8 +134,8 @@ def best_slip(planned: Floats, slipped: Floats) -> tuple[float, float]:
     """The rate of slips that makes steps most likely, and their log-likelihood; it is concave in the rate.
 
     Args:
-        planned: ``(m,)`` probability of each step for who never slips.
-        slipped: ``(m,)`` for who steps anywhere.
+        planned: ``(m,)`` probability of each step without slips.
+        slipped: ``(m,)`` probability of each step where every step is a slip.
     """
     from scipy.optimize import minimize_scalar
 
@@ -154,7 +154,7 @@ def _prepared(walks: Sequence[Trajectory]) -> Recorded:
     found: Recorded = []
     for walk in walks:
         if not isinstance(walk.layout, OvercookedLayout) or walk.goal is None:
-            raise ValueError("walks to fit people on need a kitchen and a goal")
+            raise ValueError("trajectories to fit people on need a kitchen and a goal")
         key = walk.layout, walk.goal
         if key not in fields:
             fields[key] = goal_field(walk.layout, walk.layout.stations[walk.goal])

@@ -1,9 +1,9 @@
-"""Simulated people in kitchens: two kinds of walkers, people who differ, and whole task executions.
+"""Simulated participants in kitchens: two models of how people walk, differences between them, and whole tasks.
 
 :class:`BoltzmannWalker` is the noisily rational walker that ``human="boltzmann"`` scores and
 :func:`fit_rationality` fits to recorded play. :class:`PlannerWalker` errs for other reasons: it sees only a few steps
 ahead, dislikes turning, and avoids where it has just been. A layout, or a predictor, that was made with one model of
-people should be judged with the other, too.
+people should be evaluated with the other, too.
 
 Both walk from station to station: floor cells, then the goal station. Time passes in ticks. Before each step a person
 stands idle or looks around for a while (each tick with probability ``idle`` and ``turn``); a step takes a tick and
@@ -61,10 +61,7 @@ class BoltzmannWalker(Walker):
 
     Args:
         rationality: Per unit of cost; 0 walks at random. 1.1 to 1.7 in recorded play.
-        preferences: See :class:`Walker`.
-        idle: See :class:`Walker`.
-        turn: See :class:`Walker`.
-        tick: See :class:`Walker`.
+        **arguments: Of every :class:`Walker`: ``preferences``, ``idle``, ``turn``, ``tick``.
 
     Example:
         >>> import numpy as np
@@ -118,10 +115,10 @@ class BoltzmannWalker(Walker):
 class PlannerWalker(Walker):
     """A person who plans a few steps ahead, dislikes turning, and avoids where it was just before.
 
-    At each step all ways of ``depth`` steps are compared (shorter ones that end in the goal, too) by the cost of their
+    At each step all paths of ``depth`` steps are compared (shorter ones that end in the goal, too) by the cost of their
     cells, ``turn_cost`` for every change of direction, ``recency`` times the memory of every cell on them, and the
     beeline (Manhattan distance) from their end to the goal: what lies behind the next corner is not known. The first
-    step of a best way is taken, ties broken at random; with probability ``slip`` any step. The memory of a cell grows
+    step of a best path is taken, ties broken at random; with probability ``slip`` any step. The memory of a cell grows
     by 1 with each visit and fades by ``fade`` with each step. In a kitchen with dead ends such people walk into them.
 
     Args:
@@ -130,10 +127,7 @@ class PlannerWalker(Walker):
         recency: Cost of a cell that was just visited.
         fade: What is left of a memory after a step, in [0, 1).
         slip: Probability of a random step, in [0, 1]. With 0, people may circle for ever in kitchens with dead ends.
-        preferences: See :class:`Walker`.
-        idle: See :class:`Walker`.
-        turn: See :class:`Walker`.
-        tick: See :class:`Walker`.
+        **arguments: Of every :class:`Walker`: ``preferences``, ``idle``, ``turn``, ``tick``.
     """
 
     kind = PLANNER
@@ -203,7 +197,7 @@ def simulate_participants(
     layout_name: str = "",
     **settings: Any,
 ) -> list[Trajectory]:
-    """The reaches of people who each do a whole task, in a uniformly random valid sequence.
+    """Trajectories of simulated participants who each do a whole task, in a uniformly random valid sequence.
 
     Where the task is at a stage (start, valid goals), the person walks from the cell it stands on to the goal of the
     sequence: that is a trajectory, with the valid goals as candidates (candidate set ``task``). The legs that follow,

@@ -1,4 +1,4 @@
-"""People who walk in kitchens: what every simulated walker can do, whatever decides its steps."""
+"""Simulated participants who walk in kitchens: all that does not depend on how they decide their steps."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ __all__ = ["Walker", "draw_one", "draw_preferences", "in_reach"]
 Floats = npt.NDArray[np.float64]
 
 LONGEST: Final = 100_000
-"""Steps after which a walk counts as lost: the walker cannot find the goal."""
+"""Steps after which a path counts as lost: the walker cannot find the goal."""
 
 
 class Walker(ABC):
@@ -54,7 +54,7 @@ class Walker(ABC):
         self.turn = check_finite("turn", turn, minimum=0.0)
         self.tick = check_finite("tick", tick, minimum=0.0)
         if self.idle + self.turn >= 1:
-            raise ValueError(f"idle + turn must be less than 1, got {idle!r} + {turn!r}: nobody would ever move")
+            raise ValueError(f"idle + turn must be less than 1, got {idle!r} + {turn!r}: the person would never move")
         self.preferences = None if preferences is None else np.array(preferences, dtype=np.float64)
         if self.preferences is not None and not ((self.preferences > 0) & (self.preferences < np.inf)).all():
             raise ValueError("preferences are costs of stepping on cells: they must be finite and greater than 0")
@@ -78,7 +78,7 @@ class Walker(ABC):
         return self.preferences
 
     def walk(self, layout: OvercookedLayout, start: str | Cell, goal: str, rng: np.random.Generator) -> list[Cell]:
-        """The cells of one walk: floor cells, then the goal's own.
+        """The cells of one path: floor cells, then the goal's own.
 
         Args:
             layout: The kitchen.
@@ -87,7 +87,7 @@ class Walker(ABC):
             rng: Source of randomness.
 
         Raises:
-            LayoutError: No such station, a start that is no floor cell, or no way.
+            LayoutError: No such station, a start that is no floor cell, or no path.
             RuntimeError: The person did not find the goal in 100,000 steps.
         """
         cell = self._start_cell(layout, start, goal, rng)
@@ -105,13 +105,13 @@ class Walker(ABC):
         candidates: Sequence[str] | None = None,
         **labels: Any,
     ) -> list[Trajectory]:
-        """Walks from a station to goals.
+        """Trajectories from a station to goals.
 
         Args:
             layout: The kitchen.
-            start: Name of the station left; each walk begins at one of its access cells.
-            goals: The goal, or goals of which each walk draws one.
-            n: How many walks.
+            start: Name of the station left; each trajectory begins at one of its access cells.
+            goals: The goal, or goals of which one is drawn for each trajectory.
+            n: How many trajectories.
             rng: Source of randomness.
             candidates: What an observer takes for possible; the goals if None.
             **labels: Further attributes of :class:`~legible_envs.rollouts.Trajectory`, such as ``participant``.
@@ -202,7 +202,7 @@ def draw_one(cells: Sequence[Cell], what: str, rng: np.random.Generator) -> Cell
 
 @lru_cache(maxsize=512)
 def _shortest_field(layout: OvercookedLayout, name: str) -> GoalField:
-    """The costs to go of a person without preferences, who counts steps."""
+    """The costs to go of a person without preferences: numbers of steps."""
     return goal_field(layout, layout.stations[name])
 
 

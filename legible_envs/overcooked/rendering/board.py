@@ -42,7 +42,7 @@ def draw_layout(
     labels: Mapping[Cell, str] | None = None,
     title: str | None = None,
 ) -> Image:
-    """Draw a kitchen with nobody in it.
+    """Draw a kitchen without players.
 
     Args:
         layout: Any kitchen.
