@@ -138,8 +138,8 @@ class ScriptedPlayer:
 class WalkingPlayer(ScriptedPlayer):
     """Walks to a valid goal drawn uniformly as the walker does, uses it, and draws the next.
 
-    Idles and looks around as often as the walker says. Soft virtual obstacles are avoided where another
-    path leads to the goal.
+    Idles and looks around as often as the walker does. Soft virtual obstacles are avoided where another path leads to
+    the goal.
 
     Args:
         env: An environment made by ``gymnasium.make("LegibleOvercooked-v0")``, or a vector environment of such.

@@ -108,7 +108,8 @@ def fit_rationality(
         cell_costs: ``(H, W)`` cost of stepping on each cell, 1 if None; with costs, all kitchens must be of one shape.
 
     Raises:
-        ValueError: No step with a choice; a trajectory without layout or goal, that does not fit its layout, or that jumps.
+        ValueError: No step with a choice; a trajectory without layout or goal, that does not fit its layout, or
+            that jumps.
 
     Example:
         >>> from legible_envs.overcooked import OvercookedLayout
@@ -164,7 +165,7 @@ def _collect(walks: Sequence[Trajectory], names: Sequence[str], cell_costs: npt.
     excess, taken, who = [], [], []
     for number, walk in enumerate(walks):
         if not isinstance(walk.layout, OvercookedLayout) or walk.goal is None or not walk.is_grid:
-            raise ValueError(f"walk {number} has no kitchen, no goal, or positions instead of cells")
+            raise ValueError(f"trajectory {number} has no kitchen, no goal, or positions instead of cells")
         key = walk.layout, walk.goal
         if key not in fields:
             fields[key] = goal_field(walk.layout, walk.layout.stations[walk.goal], cell_costs)
@@ -175,8 +176,8 @@ def _collect(walks: Sequence[Trajectory], names: Sequence[str], cell_costs: npt.
             if not field.floor[before] or after not in options or not is_option(after, field):
                 (a, b), (c, d) = divmod(before, field.width), divmod(after, field.width)
                 raise ValueError(
-                    f"walk {number}: the step after state {i}, from row {a}, column {b} to row {c}, column {d}, is "
-                    f"not to a neighbouring floor cell or into {walk.goal!r}"
+                    f"trajectory {number}: the step after state {i}, from row {a}, column {b} to row {c}, column {d}, "
+                    f"is not to a neighbouring floor cell or into {walk.goal!r}"
                 )
             costs = np.array([_cost(option, field) for option in options])
             excess.append(costs - costs.min())
@@ -184,7 +185,7 @@ def _collect(walks: Sequence[Trajectory], names: Sequence[str], cell_costs: npt.
             who.append(names.index(walk.participant))
     table = np.array(excess).reshape(-1, 4)
     if not len(table) or not (np.isfinite(table).sum(axis=1) > 1).any():
-        raise ValueError(f"{len(walks)} walks have no step at which there was a choice")
+        raise ValueError(f"{len(walks)} trajectories have no step at which there was a choice")
     return _Steps(table, np.array(taken), np.array(who, dtype=np.intp))
 
 
