@@ -15,6 +15,7 @@ import numpy.typing as npt
 from benchmarks.throughput.measure import Figure, alternate, rate
 from benchmarks.throughput.peers import Peer
 from benchmarks.throughput.sweep import Settings
+from legible_envs.overcooked.grid import NEIGHBOURS
 
 if TYPE_CHECKING:
     from legible_envs.rollouts.trajectory import Trajectory
@@ -123,7 +124,7 @@ def save_problem(folder: Path) -> Path:
     graph = evidence.graph
     starts = np.zeros((len(graph.goals), len(costs)))
     np.add.at(starts, (evidence.goals, evidence.starts), evidence.weights)
-    beside = graph.cells[:, None] + np.array([(-1, 0), (1, 0), (0, -1), (0, 1)])
+    beside = graph.cells[:, None] + np.array(NEIGHBOURS)
     stations = np.array([graph.layout.stations[goal] for goal in graph.goals])
     path = folder / PEER_PROBLEM
     np.savez(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from legible_envs.overcooked.env import OvercookedEnv
-from legible_envs.overcooked.game.snapshot import name_goals
+from legible_envs.overcooked.game.snapshot import to_text
 from legible_envs.overcooked.game.vectors import Kitchen, Vector
 from legible_envs.overcooked.game.view import GameView
 from legible_envs.overcooked.layout import OvercookedLayout
@@ -33,19 +33,17 @@ class GameOfBatch:
     @property
     def layout(self) -> OvercookedLayout:
         """The kitchen: the one set for the next reset, else the one being played in."""
-        packed = self._envs._chosen[self._index] or self._envs._packed[self._index]
-        return packed.layout
+        return self._envs.layout(self._index)
 
     @property
     def np_random(self) -> np.random.Generator:
         """The game's random generator."""
-        return self._envs._rng(self._index)
+        return self._envs.generator(self._index)[0]
 
     @property
     def np_random_seed(self) -> int:
         """The seed of the game's random generator."""
-        self._envs._rng(self._index)
-        return self._envs._seeds[self._index]
+        return self._envs.generator(self._index)[1]
 
     @property
     def action_space(self) -> Any:
@@ -57,22 +55,28 @@ class GameOfBatch:
         """The space of its observations."""
         return self._envs.single_observation_space
 
+    @property
+    def goals(self) -> tuple[str, ...]:
+        """Names of the valid goals, in reading order."""
+        return self._envs.goals(self._index)
+
     def view(self) -> GameView:
         """A snapshot of the game in words, for drawing."""
         return self._envs.view(self._index)
 
     def arrays(self) -> tuple[Vector, Kitchen, Vector]:
         """The game's ``(state, kitchen, rules)`` as described in ``vectors``; not copies, to be read only."""
-        return self._envs._states[self._index], self._envs._kitchens[self._index], self._envs._rules
-
-    def valid_goal_names(self) -> tuple[str, ...]:
-        """Names of the cells the player may reach for next, in reading order."""
-        return name_goals(self._envs._packed[self._index].layout, self._envs._goals[self._index])
+        return self._envs.arrays(self._index)
 
     def render(self) -> Any:
-        """The game's picture or drawing."""
-        frames = self._envs.render()
-        return None if frames is None else frames[self._index]
+        """The game's picture or drawing, as ``render_mode`` says; None with ``"human"``, where one window shows all."""
+        if self._envs.render_mode == "ansi":
+            return to_text(self.view())
+        if self._envs.render_mode != "rgb_array":
+            return None
+        from legible_envs.overcooked.rendering import draw_game
+
+        return draw_game(self.view())
 
     def __getattr__(self, name: str) -> Any:
         if name in ("settings", "render_mode", "metadata", "get_keys_to_action"):

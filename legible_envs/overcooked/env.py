@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Literal
 
 import gymnasium as gym
 import numpy as np
@@ -21,6 +21,8 @@ from legible_envs.overcooked.layouts import read_layout
 from legible_envs.overcooked.recipes import PAPER_SOUPS
 from legible_envs.overcooked.rendering.board import draw_small
 from legible_envs.overcooked.settings import KitchenSettings, PackedKitchen
+from legible_envs.overcooked.trajectories import trajectories_from_states
+from legible_envs.rollouts.trajectory import Trajectory
 from legible_envs.support.specs import JsonSpec, check_options
 
 __all__ = ["OvercookedEnv"]
@@ -36,7 +38,7 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
     One cook fetches ingredients, puts them in a pot, waits, puts the soup on a dish and serves it, until every ordered
     soup is delivered: by default the three soups of Tung, Luebbers, Roncone and Hayes, *Workspace Optimization
     Techniques to Improve Prediction of Human Motion During Human-Robot Collaboration* (HRI 2024), each once and in any
-    order. Virtual obstacles are projected on the floor to make the cook's walks easier to read. The game follows
+    order. Virtual obstacles are projected on the floor so that the cook's goals are easier to predict. The game follows
     Overcooked-AI (actions and their order, turning in place, counters that hold one item, a cook time of 20), with
     three differences: recipes are data; a pot accepts only what can still become an ordered soup, and starts by itself
     when one is complete; and an ingredient or empty dish can be put back where it came from, so that no state is a dead
@@ -94,7 +96,7 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
 
     ## Rewards
 
-    +20 for every delivery. A crossing of a soft virtual obstacle costs `obstacle_cost`. With `shaping=True`
+    +20 for every delivery. A crossing of a soft virtual obstacle costs `crossing_cost`. With `shaping=True`
     (Overcooked-AI's values) also +3 for an ingredient put in a pot, +3 for a dish fetched while a soup waits for one
     (taken back if it is put back: going to and fro gains nothing), +5 for a soup taken from the pot. A mapping with the
     keys `ingredient`, `dish`, `soup` sets other values.
@@ -120,9 +122,11 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
 
     | Key           | Content |
     | ------------- | ------- |
-    | `valid_goals` | `(H, W)` bool: cells the player may reach for next in the running game (candidate set `game`): stations and counters where an interaction would bring the game forward. `valid_goal_names()` names them |
+    | `goals`       | tuple of str: names of the valid goals, what the player may reach for next in the running game (candidate set `game`): stations and counters where an interaction would bring the game forward, in reading order; counters are `counter@(row,col)` |
+    | `goal_mask`   | `(H, W)` bool: the cells of these goals |
     | `action_mask` | `(6,)` int8: actions that do something (staying always), as `action_space.sample(mask)` takes it |
     | `layout_id`   | str: twelve hexadecimal digits that identify the kitchen |
+    | `num_done`    | int: subtasks done in this episode, here the deliveries |
     | `deliveries`  | int: soups delivered in this episode |
     | `crossings`   | int: steps onto soft virtual obstacles in this episode |
 
@@ -140,8 +144,8 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
             and delivered once.
         cook_time: Ticks a soup cooks.
         obs_type: `"grid"`, `"vector"` or `"rgb"`.
-        virtual_obstacles: `"hard"`: nobody walks over them; `"soft"`: they can be crossed, and crossings are counted.
-        obstacle_cost: What a crossing costs.
+        virtual_obstacles: `"hard"`: they block the player; `"soft"`: they can be crossed, and crossings are counted.
+        crossing_cost: What a crossing of a soft virtual obstacle costs.
         shaping: False, True, or a mapping of rewards; see Rewards.
         render_mode: None, `"human"` (a window), `"rgb_array"` or `"ansi"`.
 
@@ -168,7 +172,7 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
         cook_time: int = 20,
         obs_type: str = "grid",
         virtual_obstacles: str = "hard",
-        obstacle_cost: float = 0.0,
+        crossing_cost: float = 0.0,
         shaping: bool | Mapping[str, float] = False,
         render_mode: str | None = None,
     ) -> None:
@@ -181,7 +185,7 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
             cook_time=cook_time,
             obs_type=obs_type,
             virtual_obstacles=virtual_obstacles,
-            obstacle_cost=obstacle_cost,
+            crossing_cost=crossing_cost,
             shaping=shaping,
         )
         self.action_space = spaces.Discrete(NUM_ACTIONS)
@@ -190,6 +194,8 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
         self._pending: PackedKitchen | None = None
         self._actions = np.zeros(1, dtype=np.int64)
         self._goals = np.zeros(self.settings.shape[0] * self.settings.shape[1], dtype=np.bool_)
+        self._log = bytearray()
+        self._goal_names: tuple[str, ...] = ()
         self._observation_shape = self.observation_space.shape
         self._install(self.settings.pack(self.settings.preview()))
 
@@ -223,6 +229,8 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
         self._enter(layout)
         mask = np.empty(NUM_ACTIONS, dtype=np.int8)
         batch.begin(self._state, self._kitchen, self._rules, self._goals, mask)
+        self._log.clear()
+        self._goal_names = name_goals(self._packed.layout, self._goals)
         if self.render_mode == "human":
             self.render()
         return self._observe(), self._info(mask)
@@ -241,15 +249,19 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
         """
         try:
             self._actions[0] = action
-            valid = 0 <= self._actions[0] < NUM_ACTIONS and self._actions[0] == action
+            move = self._actions.item()
+            valid = 0 <= move < NUM_ACTIONS and move == action
         except (TypeError, ValueError, OverflowError):
             valid = False
         if not valid:
             raise ValueError(f"expected an action 0..{NUM_ACTIONS - 1}, got {action!r}")
         mask = np.empty(NUM_ACTIONS, dtype=np.int8)
-        reward, over, _ = batch.play(
+        self._log.append(move)
+        reward, over, changed = batch.play(
             self._state, self._kitchen, self._rules, self.settings.weights, self._actions, self._goals, mask
         )
+        if changed:
+            self._goal_names = name_goals(self._packed.layout, self._goals)
         if self.render_mode == "human":
             self.render()
         return self._observe(), reward, over, False, self._info(mask)
@@ -305,15 +317,18 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
         return draw_small(self.view())
 
     def _info(self, mask: npt.NDArray[np.int8]) -> dict[str, Any]:
+        deliveries = self._state.item(DELIVERIES)
         return {
-            "valid_goals": self._goals.reshape(self.settings.shape).copy(),
+            "goals": self._goal_names,
+            "goal_mask": self._goals.reshape(self.settings.shape).copy(),
             "action_mask": mask,
             "layout_id": self._packed.layout.layout_id,
-            "deliveries": int(self._state[DELIVERIES]),
-            "crossings": int(self._state[CROSSINGS]),
+            "num_done": deliveries,
+            "deliveries": deliveries,
+            "crossings": self._state.item(CROSSINGS),
         }
 
-    # -- what people and programs ask ---------------------------------------------------------------------------------
+    # -- questions to the game ---------------------------------------------------------------------------------------
 
     def view(self) -> GameView:
         """A snapshot of the game in words, for drawing."""
@@ -323,9 +338,43 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
         """The game's ``(state, kitchen, rules)`` as described in ``vectors``; not copies, to be read only."""
         return self._state, self._kitchen, self._rules
 
-    def valid_goal_names(self) -> tuple[str, ...]:
-        """Names of the cells in ``info["valid_goals"]``, in reading order; counters are ``counter@(row,col)``."""
-        return name_goals(self._packed.layout, self._goals)
+    @property
+    def goals(self) -> tuple[str, ...]:
+        """Names of the valid goals; see ``info["goals"]``."""
+        return self._goal_names
+
+    def trajectories(
+        self,
+        *,
+        participant: str = "",
+        condition: str = "",
+        candidate_set: Literal["game", "all"] = "game",
+        **options: Any,
+    ) -> list[Trajectory]:
+        """The trajectories of this episode so far, in order: empty-handed from a pot or serving station to a dispenser.
+
+        Nothing is kept for them but the actions, which are played again when this is called.
+
+        Args:
+            participant: Who plays.
+            condition: Under which condition.
+            candidate_set: Whether the candidates are the goals valid in the running game when the trajectory begins, or
+                all in reach.
+            **options: Of :func:`~legible_envs.overcooked.trajectories.trajectories_from_states`: ``layout_name``,
+                ``seconds_per_tick``, ``min_positions``, ``min_candidates``.
+        """
+        actions = np.frombuffer(bytes(self._log), dtype=np.uint8).astype(np.int64).reshape(-1, 1)
+        states = np.empty((len(actions) + 1, len(self._state)), dtype=np.int32)
+        goals = np.empty((len(states), len(self._goals)), dtype=np.bool_)
+        batch.play_back(self._kitchen, self._rules, actions, states, goals)
+        return trajectories_from_states(
+            self._packed.layout,
+            states,
+            goals if candidate_set == "game" else None,
+            participant=participant,
+            condition=condition,
+            **options,
+        )
 
     @staticmethod
     def get_keys_to_action() -> dict[tuple[int, ...], int]:

@@ -31,7 +31,7 @@ _SCHEMA: Final = 1
 
 @dataclass(frozen=True, eq=False)
 class Played:
-    """What a person did.
+    """Games that a person played.
 
     Attributes:
         layout: The kitchen.
@@ -165,7 +165,7 @@ def play(
     env = setting.make_env("rgb_array")
     steps: list[tuple[int, int, float]] = []
     try:
-        _Table(env, fps, zoom, seed, steps).run()
+        _PlayWindow(env, fps, zoom, seed, steps).run()
     except KeyboardInterrupt:
         pass  # a way to end like any other
     finally:
@@ -194,7 +194,7 @@ def _check_writable(path: Path) -> None:
         raise PermissionError(f"cannot write to the folder {path.parent}")
 
 
-class _Table:
+class _PlayWindow:
     """A window on an environment: Gymnasium's playable game, with taps that count and keys that repeat."""
 
     def __init__(

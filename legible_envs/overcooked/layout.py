@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import hashlib
-from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import Any, Final
@@ -13,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.errors import LayoutError
+from legible_envs.overcooked.grid import NEIGHBOURS, Cell
 
 __all__ = [
     "COUNTER",
@@ -25,8 +25,6 @@ __all__ = [
     "OvercookedLayout",
 ]
 
-Cell = tuple[int, int]
-
 FLOOR: Final = 0
 COUNTER: Final = 1
 OBSTACLE: Final = 2
@@ -37,7 +35,6 @@ SYMBOLS: Final = " XVTOCFDPS"
 """ASCII symbol of each cell code: floor, counter, virtual obstacle, then the stations in the order of STATION_TYPES."""
 
 _CODE_OF: Final = {symbol: code for code, symbol in enumerate(SYMBOLS)}
-_NEIGHBOURS: Final = ((-1, 0), (1, 0), (0, 1), (0, -1))
 _STRAY: Final = {".": " ", "_": " ", "#": "X"}
 MAX_SIDE: Final = 64
 
@@ -232,6 +229,15 @@ class OvercookedLayout:
             for kind, (r, c) in zip(kinds, found, strict=True)
         }
 
+    @cached_property
+    def goal_names(self) -> tuple[str, ...]:
+        """Name of each cell as a goal, in reading order: the station's on it, else ``counter@(row,col)``."""
+        height, width = self.shape
+        names = [f"counter@({row},{col})" for row in range(height) for col in range(width)]
+        for name, (row, col) in self.stations.items():
+            names[row * width + col] = name
+        return tuple(names)
+
     def named(self, kind: str) -> tuple[str, ...]:
         """Names of all stations of one type, in reading order."""
         return tuple(name for name in self.stations if name.partition("@")[0] == kind)
@@ -253,7 +259,7 @@ class OvercookedLayout:
         if name not in self.stations:
             raise LayoutError(f"no station {name!r}; this kitchen has {list(self.stations)}", rule="station")
         row, col = self.stations[name]
-        return tuple(cell for dr, dc in _NEIGHBOURS if self.is_floor(cell := (row + dr, col + dc)))
+        return tuple(cell for dr, dc in NEIGHBOURS if self.is_floor(cell := (row + dr, col + dc)))
 
     def is_floor(self, cell: Sequence[int]) -> bool:
         """Whether a person can stand on the cell; False outside the grid."""
@@ -271,20 +277,13 @@ class OvercookedLayout:
         return hashlib.sha256(self.to_ascii().encode()).hexdigest()[:12]
 
     def distances_from(self, cells: Iterable[Sequence[int]]) -> npt.NDArray[np.int32]:
-        """``(H, W)`` number of floor moves from the nearest of the given floor cells; -1 where there is no way."""
-        distances = np.full(self.shape, -1, dtype=np.int32)
-        queue: deque[Cell] = deque()
-        for cell in cells:
-            if self.is_floor(cell):
-                distances[cell[0], cell[1]] = 0
-                queue.append((int(cell[0]), int(cell[1])))
-        while queue:
-            row, col = queue.popleft()
-            for dr, dc in _NEIGHBOURS:
-                following = (row + dr, col + dc)
-                if self.is_floor(following) and distances[following] < 0:
-                    distances[following] = distances[row, col] + 1
-                    queue.append(following)
+        """``(H, W)`` number of floor moves from the nearest of the given floor cells; -1 where no path leads."""
+        from legible_envs.overcooked.grid_kernels import steps_from  # layouts are read and written without numba
+
+        height, width = self.shape
+        sources = np.array([cell[0] * width + cell[1] for cell in cells if self.is_floor(cell)], dtype=np.int64)
+        distances = np.empty(self.shape, dtype=np.int32)
+        steps_from(sources, (self._cells == FLOOR).ravel(), height, width, distances.ravel())
         return distances
 
     # -- changed copies ------------------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""Policies for kitchens: a scripted cook who finishes every valid one, and simulated people at play."""
+"""Policies for kitchens, called with ``(observation, info)``: a scripted player, and simulated participants at play."""
 
 from __future__ import annotations
 
@@ -7,92 +7,25 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from legible_envs.overcooked.game.dynamics import walkable
-from legible_envs.overcooked.game.vectors import AT_PLAYERS, HEIGHT, INTERACT, STAY, WIDTH, Kitchen, Vector
-from legible_envs.overcooked.humans.kernels import Way, beside, choose_step, find_costs, look_around
-from legible_envs.overcooked.layout import OBSTACLE
+from legible_envs.overcooked.game.vectors import AT_PLAYERS, HEIGHT, INTERACT, SOFT, STAY, WIDTH, Kitchen, Vector
+from legible_envs.overcooked.grid_kernels import costs_to, neighbour, steps_from
+from legible_envs.overcooked.humans.kernels import GoalField, choose_action, choose_step, look_around
+from legible_envs.overcooked.layout import FLOOR, OBSTACLE
 
 if TYPE_CHECKING:
     from legible_envs.overcooked.humans.walker import Walker
 
+__all__ = ["ScriptedPlayer", "WalkingPlayer"]
 
-from legible_envs.overcooked.game.dynamics import neighbour
-from legible_envs.support.compiled import kernel
-
-__all__ = ["ScriptedPlayer", "WalkingPlayer", "choose_action", "find_distances"]
-
-
-@kernel
-def find_distances(goal: int, kitchen: Kitchen, rules: Vector, avoid: bool, distances: npt.NDArray[np.int32]) -> None:
-    """Write the steps from every cell to one beside the goal.
-
-    Args:
-        goal: Flat cell of a station or counter.
-        kitchen: See ``vectors``.
-        rules: See ``vectors``.
-        avoid: Whether to keep off virtual obstacles, even those that can be crossed.
-        distances: ``(H*W,)``, written; -1 where there is no way.
-    """
-    queue = np.empty(rules[HEIGHT] * rules[WIDTH], dtype=np.int32)
-    distances[:] = -1
-    head, tail = 0, 0
-    for direction in range(4):
-        cell = neighbour(goal, direction, rules)
-        if cell >= 0 and walkable(kitchen[cell], rules) and not (avoid and kitchen[cell] == OBSTACLE):
-            distances[cell] = 0
-            queue[tail] = cell
-            tail += 1
-    while head < tail:
-        cell = queue[head]
-        head += 1
-        for direction in range(4):
-            beside = neighbour(cell, direction, rules)
-            if beside < 0 or distances[beside] >= 0 or not walkable(kitchen[beside], rules):
-                continue
-            if not (avoid and kitchen[beside] == OBSTACLE):
-                distances[beside] = distances[cell] + 1
-                queue[tail] = beside
-                tail += 1
-
-
-@kernel
-def choose_action(
-    state: Vector, rules: Vector, goal: int, distances: npt.NDArray[np.int32], can_interact: bool, chance: float
-) -> int:
-    """Next action on a shortest path to the goal; STAY beside a pot that is not ready yet.
-
-    Args:
-        state: See ``vectors``.
-        rules: See ``vectors``.
-        goal: Flat cell of the goal.
-        distances: Made by :func:`find_distances` for this goal.
-        can_interact: Whether INTERACT would do something now.
-        chance: Number in [0, 1) that picks one of the equally good steps.
-    """
-    cell = state[AT_PLAYERS]
-    options = np.empty(4, dtype=np.int64)
-    count = 0
-    for direction in range(4):
-        beside = neighbour(cell, direction, rules)
-        if distances[cell] == 0:
-            if beside == goal:
-                if state[AT_PLAYERS + 1] != direction:
-                    return direction
-                return INTERACT if can_interact else STAY
-        elif beside >= 0 and 0 <= distances[beside] < distances[cell]:
-            options[count] = direction
-            count += 1
-    if count == 0:
-        return STAY
-    return int(options[int(chance * count)])
+Flags = npt.NDArray[np.bool_]
 
 
 class ScriptedPlayer:
     """Walks to a valid goal drawn uniformly, by a shortest path, uses it, and draws the next.
 
-    At every cell each step that shortens the way is equally likely. Soft virtual obstacles are kept off where there is
-    another way (see ``avoid_obstacles``). Reads the game from the environment, so it plays with every ``obs_type``,
-    under wrappers, and in vector environments.
+    At every cell each step along a shortest path is equally likely. Soft virtual obstacles are avoided where another
+    path leads to the goal (see ``avoid_obstacles``). Reads the game from the environment, so it plays with every
+    ``obs_type``, under wrappers, and in vector environments.
 
     Args:
         env: An environment made by ``gymnasium.make("LegibleOvercooked-v0")``, or a vector environment of such.
@@ -118,10 +51,11 @@ class ScriptedPlayer:
         self.avoid_obstacles = avoid_obstacles
         self.num_envs: int | None = getattr(env.unwrapped, "num_envs", None)
         count = self.num_envs or 1
-        self._width = 1
+        self._height = self._width = 1
         self._goals = [-1] * count
         self._layout_ids = [""] * count
-        self._distances: list[npt.NDArray[np.int32] | None] = [None] * count
+        self._floors: list[tuple[Flags, Flags] | None] = [None] * count
+        self._steps: list[npt.NDArray[np.int32] | None] = [None] * count
 
     def __call__(self, obs: Any, info: dict[str, Any]) -> Any:
         """The next action, an integer; for a vector environment ``(N,)`` integers.
@@ -131,69 +65,81 @@ class ScriptedPlayer:
             info: The info returned with it.
         """
         if self.num_envs is None:
-            return self._act(
-                0, self.env.unwrapped.arrays(), info["valid_goals"], info["action_mask"], info["layout_id"]
-            )
+            return self._act(0, self.env.unwrapped.arrays(), info["goal_mask"], info["action_mask"], info["layout_id"])
         arrays = self.env.call("arrays")
-        keys = ("valid_goals", "action_mask", "layout_id")
+        keys = ("goal_mask", "action_mask", "layout_id")
         return np.array([self._act(i, arrays[i], *(info[key][i] for key in keys)) for i in range(self.num_envs)])
 
     def goal(self, index: int = 0) -> tuple[int, int] | None:
         """``(row, col)`` of the goal walked to in a game, None between goals."""
         return None if self._goals[index] < 0 else divmod(self._goals[index], self._width)
 
-    def _has_goal(self, index: int, valid_goals: npt.NDArray[np.bool_], layout_id: str) -> bool:
+    def _has_goal(self, index: int, goal_mask: npt.NDArray[np.bool_], layout_id: str) -> bool:
         """Whether there is something to walk to; where the last goal is no longer valid, another is drawn."""
-        marked = valid_goals.ravel()
+        marked = goal_mask.ravel()
         if layout_id == self._layout_ids[index] and self._goals[index] >= 0 and marked[self._goals[index]]:
             return True
         choices = np.flatnonzero(marked)
         if not len(choices):
             return False
-        self._layout_ids[index] = layout_id
+        if layout_id != self._layout_ids[index]:
+            self._layout_ids[index] = layout_id
+            self._floors[index] = None
         self._goals[index] = int(self.rng.choice(choices))
-        self._forget_way(index)
+        self._forget_path(index)
         return True
 
-    def _forget_way(self, index: int) -> None:
+    def _forget_path(self, index: int) -> None:
         """The goal of a game is a new one."""
-        self._distances[index] = None
+        self._steps[index] = None
 
     def _act(
         self,
         index: int,
         arrays: tuple[Vector, Kitchen, Vector],
-        valid_goals: npt.NDArray[np.bool_],
+        goal_mask: npt.NDArray[np.bool_],
         action_mask: npt.NDArray[np.int8],
         layout_id: str,
     ) -> int:
         state, kitchen, rules = arrays
-        self._width = int(rules[WIDTH])
-        if not self._has_goal(index, valid_goals, layout_id):
+        if not self._has_goal(index, goal_mask, layout_id):
             return STAY
-        distances = self._distances[index]
-        if distances is None or distances[state[AT_PLAYERS]] < 0:
-            distances = self._distances[index] = self._find_way(self._goals[index], state, kitchen, rules)
-        action = choose_action(
-            state, rules, self._goals[index], distances, bool(action_mask[INTERACT]), float(self.rng.random())
-        )
+        cell, facing = int(state[AT_PLAYERS]), int(state[AT_PLAYERS + 1])
+        goal, steps = self._goals[index], self._steps[index]
+        if steps is None or steps[cell] < 0:
+            steps = self._steps[index] = self._find_steps(index, cell, kitchen, rules)
+        can_interact = bool(action_mask[INTERACT])
+        action = choose_action(cell, facing, goal, steps, self._height, self._width, can_interact, self.rng.random())
         if action == INTERACT:
             self._goals[index] = -1
         return int(action)
 
-    def _find_way(self, goal: int, state: Vector, kitchen: Kitchen, rules: Vector) -> npt.NDArray[np.int32]:
-        distances = np.empty(int(rules[HEIGHT] * rules[WIDTH]), dtype=np.int32)
-        find_distances(goal, kitchen, rules, self.avoid_obstacles, distances)
-        if self.avoid_obstacles and distances[state[AT_PLAYERS]] < 0:
-            # Standing on an obstacle, or shut in by them: the only way leads across.
-            find_distances(goal, kitchen, rules, False, distances)
-        return distances
+    def _find_steps(self, index: int, cell: int, kitchen: Kitchen, rules: Vector) -> npt.NDArray[np.int32]:
+        """``(H*W,)`` fewest moves from the goal's cell, over obstacles only where no other path leads."""
+        floors = self._find_floors(index, kitchen, rules)
+        goal, steps = np.array([self._goals[index]]), np.empty(self._height * self._width, dtype=np.int32)
+        for floor in floors if self.avoid_obstacles else floors[1:]:
+            steps_from(goal, floor, self._height, self._width, steps)
+            if steps[cell] >= 0:
+                break
+        return steps
+
+    def _find_floors(self, index: int, kitchen: Kitchen, rules: Vector) -> tuple[Flags, Flags]:
+        """``(H*W,)`` where the player can stand off virtual obstacles, and where at all."""
+        found = self._floors[index]
+        if found is None:
+            self._height, self._width = int(rules[HEIGHT]), int(rules[WIDTH])
+            codes = kitchen[: self._height * self._width]
+            clear = codes == FLOOR
+            found = self._floors[index] = clear, (clear | (codes == OBSTACLE)) if rules[SOFT] else clear
+        return found
 
 
 class WalkingPlayer(ScriptedPlayer):
     """Walks to a valid goal drawn uniformly as the walker does, uses it, and draws the next.
 
-    Idles and looks around as often as the walker says. Soft virtual obstacles are kept off where there is another way.
+    Idles and looks around as often as the walker does. Soft virtual obstacles are avoided where another path leads to
+    the goal.
 
     Args:
         env: An environment made by ``gymnasium.make("LegibleOvercooked-v0")``, or a vector environment of such.
@@ -204,7 +150,7 @@ class WalkingPlayer(ScriptedPlayer):
         >>> import gymnasium as gym, legible_envs, numpy as np
         >>> from legible_envs.overcooked.humans import BoltzmannWalker
         >>> env = gym.make("LegibleOvercooked-v0", max_episode_steps=5000)
-        >>> player = BoltzmannWalker(rationality=1.3).policy(env, np.random.default_rng(0))
+        >>> player = WalkingPlayer(env, BoltzmannWalker(rationality=1.3), np.random.default_rng(0))
         >>> obs, info = env.reset(seed=0)
         >>> over = False
         >>> while not over:
@@ -219,33 +165,35 @@ class WalkingPlayer(ScriptedPlayer):
         self.walker = walker
         self._walks: list[_Walk | None] = [None] * len(self._goals)
 
-    def _forget_way(self, index: int) -> None:
+    def _forget_path(self, index: int) -> None:
         self._walks[index] = None
 
     def _act(
         self,
         index: int,
         arrays: tuple[Vector, Kitchen, Vector],
-        valid_goals: npt.NDArray[np.bool_],
+        goal_mask: npt.NDArray[np.bool_],
         action_mask: npt.NDArray[np.int8],
         layout_id: str,
     ) -> int:
         state, kitchen, rules = arrays
-        self._width = int(rules[WIDTH])
-        if not self._has_goal(index, valid_goals, layout_id):
+        if not self._has_goal(index, goal_mask, layout_id):
             return STAY
         cell, facing = int(state[AT_PLAYERS]), int(state[AT_PLAYERS + 1])
         walk = self._walks[index]
         if walk is None or not walk.leads_from(cell):
-            walk = self._walks[index] = _Walk(self.walker, cell, self._goals[index], kitchen, rules)
-        chance = self.rng.random()
-        if chance < self.walker.idle:
+            floors = self._find_floors(index, kitchen, rules)
+            walk = self._walks[index] = _Walk(
+                self.walker, cell, self._goals[index], floors, (self._height, self._width)
+            )
+        u = self.rng.random()
+        if u < self.walker.idle:
             return STAY
-        if chance < self.walker.idle + self.walker.turn:
+        if u < self.walker.idle + self.walker.turn:
             towards = walk.look_around(cell, self.rng.random())
             return STAY if towards < 0 else towards
         direction = walk.next_direction(cell, self.walker, self.rng)
-        if beside(cell, direction, walk.way.height, walk.way.width) != self._goals[index] or facing != direction:
+        if neighbour(cell, direction, self._height, self._width) != self._goals[index] or facing != direction:
             return direction
         if not action_mask[INTERACT]:
             return STAY
@@ -254,30 +202,31 @@ class WalkingPlayer(ScriptedPlayer):
 
 
 class _Walk:
-    """One person's way to one goal in a running game, and what was decided on it."""
+    """One person's path to one goal in a running game, and the last decision on it."""
 
-    def __init__(self, walker: Walker, cell: int, goal: int, kitchen: Kitchen, rules: Vector) -> None:
-        height, width = int(rules[HEIGHT]), int(rules[WIDTH])
-        codes = kitchen[: height * width]
-        self._open = np.array([walkable(code, rules) for code in codes])
-        self._memory = np.zeros(len(codes))
+    def __init__(
+        self, walker: Walker, cell: int, goal: int, floors: tuple[Flags, Flags], shape: tuple[int, int]
+    ) -> None:
+        height, width = shape
+        self._open = floors[1]
+        self._memory = np.zeros(height * width)
         self._weights = np.empty(4)
         self._heading = -1
         self._decided: tuple[int, int] | None = None
-        costs = walker.costs((height, width)).ravel()
-        best = np.empty(len(codes))
-        for floor in (self._open & (codes != OBSTACLE), self._open):
-            find_costs(height, width, floor, costs, goal, best)
-            self.way = Way(height, width, floor, costs, goal, best)
-            # Standing on an obstacle, or shut in by them, the only way leads across.
+        costs = walker.costs(shape).ravel()
+        cost_to_go = np.empty(height * width)
+        for floor in floors:
+            costs_to(goal, floor, costs, height, width, cost_to_go)
+            self.field = GoalField(height, width, floor, costs, goal, cost_to_go)
+            # Standing on an obstacle, or shut in by them, the only path leads across.
             if self.leads_from(cell):
                 break
 
     def leads_from(self, cell: int) -> bool:
-        return bool(self.way.best[cell] < np.inf)
+        return bool(self.field.cost_to_go[cell] < np.inf)
 
-    def look_around(self, cell: int, chance: float) -> int:
-        return int(look_around(cell, self.way.height, self.way.width, self._open, chance))
+    def look_around(self, cell: int, u: float) -> int:
+        return int(look_around(cell, self.field.height, self.field.width, self._open, u))
 
     def next_direction(self, cell: int, walker: Walker, rng: np.random.Generator) -> int:
         """Decide once at each cell: a person who turns to the goal does not think again before using it."""
@@ -287,7 +236,7 @@ class _Walk:
             if not self.leads_from(cell):
                 return STAY
             direction = choose_step(
-                walker.kind, walker.numbers, cell, self._heading, self.way, self._memory, rng.random(), self._weights
+                walker.kind, walker.params, cell, self._heading, self.field, self._memory, rng.random(), self._weights
             )
             self._decided = cell, int(direction)
         return self._decided[1]

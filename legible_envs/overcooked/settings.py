@@ -50,7 +50,7 @@ class KitchenSettings:
         cook_time: int = 20,
         obs_type: str = "grid",
         virtual_obstacles: str = "hard",
-        obstacle_cost: float = 0.0,
+        crossing_cost: float = 0.0,
         shaping: bool | Mapping[str, float] = False,
     ) -> None:
         self.shape = _read_shape(shape)
@@ -58,8 +58,8 @@ class KitchenSettings:
             raise ValueError(f"`obs_type` must be one of {OBS_TYPES}, got {obs_type!r}")
         if virtual_obstacles not in ("hard", "soft"):
             raise ValueError(f"`virtual_obstacles` must be 'hard' or 'soft', got {virtual_obstacles!r}")
-        if not np.isfinite(obstacle_cost) or obstacle_cost < 0:
-            raise ValueError(f"`obstacle_cost` must be a finite number >= 0, got {obstacle_cost!r}")
+        if not np.isfinite(crossing_cost) or crossing_cost < 0:
+            raise ValueError(f"`crossing_cost` must be a finite number >= 0, got {crossing_cost!r}")
         if layout is not None and layouts is not None:
             raise ValueError("give either `layout` (one kitchen) or `layouts` (a distribution), not both")
         self.obs_type = obs_type
@@ -69,7 +69,7 @@ class KitchenSettings:
             soft_obstacles=virtual_obstacles == "soft",
         )
         bonus = _read_shaping(shaping)
-        self.weights = np.array([DELIVERY_REWARD, bonus["ingredient"], bonus["dish"], bonus["soup"], -obstacle_cost])
+        self.weights = np.array([DELIVERY_REWARD, bonus["ingredient"], bonus["dish"], bonus["soup"], -crossing_cost])
         self.distribution: LayoutDistribution | None = None
         self.layout: OvercookedLayout | None = None
         if layouts is not None:

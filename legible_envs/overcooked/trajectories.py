@@ -1,4 +1,4 @@
-"""Finding the walks in an episode: empty-handed from a pot or serving station to an ingredient or dish."""
+"""Trajectories in an episode: empty-handed from a pot or serving station to an ingredient or dish station."""
 
 from __future__ import annotations
 
@@ -8,27 +8,39 @@ from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from legible_envs.errors import LayoutError
+from legible_envs.overcooked.game.snapshot import name_goals
+from legible_envs.overcooked.game.vectors import AT_PLAYERS
 from legible_envs.overcooked.game.view import GameView
-from legible_envs.overcooked.layout import INGREDIENTS, Cell, OvercookedLayout
+from legible_envs.overcooked.grid import NEIGHBOURS, Cell
+from legible_envs.overcooked.layout import INGREDIENTS, OvercookedLayout
 from legible_envs.rollouts.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-__all__ = ["ValidGoals", "Walk", "dispensers_in_reach", "find_walks", "record_episode", "trajectories_from_views"]
+    from legible_envs.overcooked.human_play import Played
+
+__all__ = [
+    "ValidGoals",
+    "Walk",
+    "dispensers_in_reach",
+    "find_walks",
+    "trajectories",
+    "trajectories_from_played",
+    "trajectories_from_states",
+    "trajectories_from_views",
+]
 
 ValidGoals = Callable[[int, int], "Collection[str]"]
 """Goals that are valid in the running game, called with (tick, player)."""
 
-_STEPS: Final = ((-1, 0), (1, 0), (0, 1), (0, -1))
 _STARTS: Final = ("pot", "serving")
 _GOALS: Final = (*INGREDIENTS, "dish")
 _KINDS: Final = {kind: code for code, kind in enumerate((*INGREDIENTS, "dish", "soup"), 1)}
 
 
 class Walk(NamedTuple):
-    """A walk of one player.
+    """One trajectory of one player, as cells and ticks.
 
     Attributes:
         start: Station whose use emptied the hands.
@@ -50,17 +62,17 @@ def find_walks(
     held: npt.NDArray[np.integer],
     start: str | None = None,
 ) -> Iterator[Walk]:
-    """The walks of one player through one episode.
+    """The trajectories of one player through one episode.
 
-    A walk begins when using a pot or serving station empties the hands, ends when an ingredient or dish station fills
-    them, and is dropped where anything else fills them in between.
+    A trajectory begins when using a pot or serving station empties the hands, ends when an ingredient or dish station
+    fills them, and is dropped where anything else fills them in between.
 
     Args:
         layout: The kitchen.
         cells: ``(T, 2)`` row and column, one state a tick.
         facing: ``(T,)`` 0 N, 1 S, 2 E, 3 W.
         held: ``(T,)`` item held, 0 for nothing.
-        start: Station where the player counts as standing at first; None drops a first walk that starts nowhere.
+        start: Station where the player counts as standing at first; None drops a first trajectory without a start.
     """
     origin: tuple[str, int] | None = (start, 0) if start is not None and held[0] == 0 else None
     for tick in np.flatnonzero(np.diff(held.astype(np.int64))).tolist():
@@ -76,7 +88,7 @@ def find_walks(
 
 
 def _faced(layout: OvercookedLayout, cell: Sequence[int], facing: int) -> str | None:
-    step = _STEPS[facing]
+    step = NEIGHBOURS[facing]
     return layout.station_at((int(cell[0]) + step[0], int(cell[1]) + step[1]))
 
 
@@ -110,7 +122,7 @@ def trajectories(
     round_trips: bool = True,
     **labels: Any,
 ) -> list[Trajectory]:
-    """Walks of all players as trajectories; arrays as in ``find_walks`` with a player axis after the first.
+    """The trajectories of all players; arrays as in ``find_walks`` with a player axis after the first.
 
     Args:
         layout: The kitchen.
@@ -120,11 +132,11 @@ def trajectories(
         seconds: ``(T,)`` time of each state.
         participants: ``n`` names.
         starts: ``n`` stations where players count as standing at first.
-        valid_goals: Goals of the running game; the candidates are then those in reach among them when the walk begins
-            (candidate set ``game``), and walks to other goals are left out. None: all in reach (``all``).
-        min_positions: Fewest floor cells of a walk.
-        min_candidates: Fewest candidates of a walk.
-        round_trips: Whether to keep walks that end on the cell they began on, because start and goal share it.
+        valid_goals: Goals of the running game; the candidates are then those in reach among them when it begins
+            (candidate set ``game``), and trajectories to other goals are left out. None: all in reach (``all``).
+        min_positions: Fewest floor cells of a trajectory.
+        min_candidates: Fewest candidates of a trajectory.
+        round_trips: Whether to keep trajectories that end on the cell they began on, because start and goal share it.
         labels: Further attributes of :class:`~legible_envs.rollouts.Trajectory`.
     """
     found = []
@@ -155,6 +167,48 @@ def trajectories(
     return found
 
 
+def trajectories_from_states(
+    layout: OvercookedLayout,
+    states: npt.NDArray[np.int32],
+    goals: npt.NDArray[np.bool_] | None,
+    *,
+    participant: str = "",
+    condition: str = "",
+    layout_name: str = "",
+    seconds_per_tick: float = 0.15,
+    min_positions: int = 1,
+    min_candidates: int = 1,
+) -> list[Trajectory]:
+    """The trajectories in one player's episode, from the state vectors of the dynamics.
+
+    Args:
+        layout: The kitchen.
+        states: ``(T, state_size)`` as described in :mod:`legible_envs.overcooked.game.vectors`.
+        goals: ``(T, H*W)`` valid goals in each state; the candidates are then those of the game. None: all in reach.
+        participant: Who played.
+        condition: Under which condition.
+        layout_name: The kitchen's name, if it has one.
+        seconds_per_tick: Length of a tick.
+        min_positions: Fewest floor cells of a trajectory.
+        min_candidates: Fewest candidates of a trajectory.
+    """
+    cells = np.stack(np.divmod(states[:, AT_PLAYERS], layout.shape[1]), axis=-1)
+    return trajectories(
+        layout,
+        cells[:, None],
+        states[:, AT_PLAYERS + 1, None],
+        states[:, AT_PLAYERS + 2, None],
+        np.arange(len(states)) * seconds_per_tick,
+        participants=[participant],
+        starts=[_station_beside(layout, cells[0])],
+        valid_goals=None if goals is None else lambda tick, _: name_goals(layout, goals[tick]),
+        min_positions=min_positions,
+        min_candidates=min_candidates,
+        condition=condition,
+        layout_name=layout_name,
+    )
+
+
 def trajectories_from_views(
     views: Sequence[GameView],
     *,
@@ -166,20 +220,20 @@ def trajectories_from_views(
     min_positions: int = 1,
     min_candidates: int = 1,
 ) -> list[Trajectory]:
-    """The walks in an episode, from the views of all its states in order.
+    """The trajectories in an episode, from the views of all its states in order.
 
     A player whose first cell is beside a serving station counts as standing at serving, where the task begins.
 
     Args:
         views: The states, beginning with the one after ``reset``.
-        valid_goals: For each state the valid goals of a single player's game (``env.unwrapped.valid_goal_names()``);
+        valid_goals: For each state the valid goals of a single player's game (``env.unwrapped.goals``);
             given them, the candidates are those of the game.
         participant: Who played; several players are told apart as ``NAME/0``, ``NAME/1``, ….
         condition: Under which condition.
         layout_name: The kitchen's name, if it has one.
         seconds_per_tick: Length of a tick.
-        min_positions: Fewest floor cells of a walk.
-        min_candidates: Fewest candidates of a walk.
+        min_positions: Fewest floor cells of a trajectory.
+        min_candidates: Fewest candidates of a trajectory.
 
     Raises:
         ValueError: No view, views of different kitchens, or another number of goal lists than of views.
@@ -214,36 +268,35 @@ def _station_beside(layout: OvercookedLayout, cell: Sequence[int]) -> str | None
     return next((n for n in layout.named("serving") if (int(cell[0]), int(cell[1])) in layout.access(n)), None)
 
 
-def record_episode(
-    env: Any,
-    policy: Callable[[Any, dict[str, Any]], int],
-    *,
-    seed: int | None = None,
-    options: dict[str, Any] | None = None,
-    candidate_set: Literal["game", "all"] = "game",
-    **labels: Any,
+def trajectories_from_played(
+    played: Played, *, candidate_set: Literal["game", "all"] = "game", **labels: Any
 ) -> list[Trajectory]:
-    """Play one episode of ``LegibleOvercooked-v0`` and return its walks.
+    """The trajectories in what ``legible play --record`` wrote, by playing its actions again.
 
     Args:
-        env: The environment, wrapped or not.
-        policy: Called with (observation, info), returns an action.
-        seed: For ``reset``.
-        options: For ``reset``.
+        played: As of :func:`legible_envs.overcooked.human_play.load_played`.
         candidate_set: Whether the candidates are the goals valid in the running game or all in reach.
-        labels: Options of :func:`trajectories_from_views`, such as ``participant``.
+        labels: Further arguments of ``OvercookedEnv.trajectories``: ``participant``, ``condition``, ….
 
     Raises:
-        LayoutError: The environment shows no kitchen.
+        ValueError: The actions do not give the recorded rewards: the recording is of another version of the game.
     """
-    game = env.unwrapped
-    if not hasattr(game, "view") or not hasattr(game, "valid_goal_names"):
-        raise LayoutError(f"expected a LegibleOvercooked environment, got {type(game).__name__}", rule="type")
-    observation, info = env.reset(seed=seed, options=options)
-    views, goals, over = [game.view()], [game.valid_goal_names()], False
-    while not over:
-        observation, _, terminated, truncated, info = env.step(policy(observation, info))
-        views.append(game.view())
-        goals.append(game.valid_goal_names())
-        over = terminated or truncated
-    return trajectories_from_views(views, valid_goals=goals if candidate_set == "game" else None, **labels)
+    env = played.make_env()
+    game: Any = env.unwrapped
+    found: list[Trajectory] = []
+    try:
+        current = None
+        for number, (action, episode) in enumerate(zip(played.actions, played.episodes, strict=True)):
+            if episode != current:
+                found += game.trajectories(candidate_set=candidate_set, **labels)
+                env.reset(seed=played.seed if current is None else None)
+                current = episode
+            _, reward, *_ = env.step(int(action))
+            if not np.isclose(float(reward), played.rewards[number]):
+                raise ValueError(
+                    f"step {number} was recorded with reward {played.rewards[number]:g} and gives {float(reward):g} "
+                    "now; the recording belongs to another version of the game"
+                )
+        return found + game.trajectories(candidate_set=candidate_set, **labels)
+    finally:
+        env.close()

@@ -17,10 +17,12 @@ from legible_envs.drawing.rendered import Windowed
 from legible_envs.overcooked.batch_game import GameOfBatch
 from legible_envs.overcooked.env import NUM_ACTIONS, OvercookedEnv
 from legible_envs.overcooked.game import batch
+from legible_envs.overcooked.game.batch import Batch, Outcome
 from legible_envs.overcooked.game.rules import pack_rules
-from legible_envs.overcooked.game.snapshot import make_view, to_text
-from legible_envs.overcooked.game.vectors import CROSSINGS, DELIVERIES, STATE_SIZE
+from legible_envs.overcooked.game.snapshot import make_view, name_goals, to_text
+from legible_envs.overcooked.game.vectors import CROSSINGS, DELIVERIES, STATE_SIZE, Kitchen, Vector
 from legible_envs.overcooked.game.view import GameView
+from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.overcooked.layouts import read_layout
 from legible_envs.overcooked.rendering.board import draw_small, tile_pictures
 from legible_envs.overcooked.settings import KitchenSettings, PackedKitchen, count_pots
@@ -36,8 +38,9 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
 
     Made by ``gymnasium.make_vec("LegibleOvercooked-v0", num_envs=N, vectorization_mode="vector_entry_point")``.
     Observations, rewards, terminations, truncations and infos are those of ``SyncVectorEnv`` with the same seeds, in
-    all three autoreset modes. A layout per game: ``envs.set_attr("layout", [...])``, from each game's next reset on;
-    ``envs.reset(options={"layout": ...})`` puts all games into one kitchen.
+    all three autoreset modes, but for one key: infos have ``goal_mask`` without ``goals``, the names, which
+    ``envs.goals(i)`` gives when asked. A layout per game: ``envs.set_attr("layout", [...])``, from each game's next
+    reset on; ``envs.reset(options={"layout": ...})`` puts all games into one kitchen.
 
     Args:
         num_envs: Number of games.
@@ -82,7 +85,6 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self._rngs: list[np.random.Generator | None] = [None] * self.num_envs
         self._seeds = [-1] * self.num_envs
-        self._done = np.zeros(self.num_envs, dtype=np.bool_)
         self._ended = 0
         self._begun = False
         self._allocate(self.settings.pack(self.settings.preview()))
@@ -91,19 +93,22 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
         """Make the arrays, every game in the same kitchen."""
         count = self.num_envs
         cells = self.settings.shape[0] * self.settings.shape[1]
-        self._rules = packed.rules
         self._num_pots = count_pots(packed.layout)
         self._packed = [packed] * count
         self._chosen: list[PackedKitchen | None] = [None] * count
         self._ids = np.full(count, packed.layout.layout_id, dtype=object)
-        self._kitchens = np.repeat(packed.kitchen[None], count, axis=0)
         self._routes = np.repeat(packed.routes[None], count, axis=0)
-        self._states = np.zeros((count, int(packed.rules[STATE_SIZE])), dtype=np.int32)
-        self._goals = np.zeros((count, cells), dtype=np.bool_)
+        self._games = Batch(
+            states=np.zeros((count, int(packed.rules[STATE_SIZE])), dtype=np.int32),
+            kitchens=np.repeat(packed.kitchen[None], count, axis=0),
+            rules=packed.rules,
+            goals=np.zeros((count, cells), dtype=np.bool_),
+            drawn=np.full(count, -1, dtype=np.int32),
+            done=np.zeros(count, dtype=np.bool_),
+        )
         self._observations_shape = (count, *self.single_observation_space.shape)  # type: ignore[misc]
         self._grids = np.zeros(self._observations_shape if self.settings.obs_type == "grid" else 0, dtype=np.uint8)
         self._goals_shape = (count, *self.settings.shape)
-        self._drawn = np.full(count, -1, dtype=np.int32)
         self._everyone = np.ones(count, dtype=np.bool_)
 
     # -- the Gymnasium interface --------------------------------------------------------------------------------------
@@ -157,35 +162,25 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
         """
         moves = self._read_actions(actions)
         self._check_begun()
+        games = self._games
         if self._ended:
-            for i in np.flatnonzero(self._done):
+            for i in np.flatnonzero(games.done):
                 self._enter_next(int(i))
-        rewards = np.empty(self.num_envs)
-        ends = np.empty((2, self.num_envs), dtype=np.bool_)
-        masks = np.empty((self.num_envs, NUM_ACTIONS), dtype=np.int8)
-        self._ended = batch.play_all(
-            self._states,
-            self._kitchens,
-            self._rules,
-            self.settings.weights,
-            self.max_episode_steps or 0,
-            moves,
-            self._goals,
-            self._drawn,
-            masks,
-            rewards,
-            ends,
-            self._done,
-        )
-        terminations, truncations = ends
-        infos: Infos = {}
+            games = self._games
+        count = self.num_envs
+        ends = np.empty((2, count), dtype=np.bool_)
+        outcome = Outcome(np.empty((count, NUM_ACTIONS), dtype=np.int8), np.empty(count), ends[0], ends[1])
+        limit = self.max_episode_steps or 0
+        self._ended = batch.play_all(*games, self.settings.weights, limit, moves, *outcome)
+        final: Infos = {}
         if self._ended and self.autoreset_mode == AutoresetMode.SAME_STEP:
-            infos = self._finish(self._done, masks)
-            self._restart(self._done, masks)
-        infos.update(self._infos(masks))
+            final = self._finish(games.done, outcome.masks)
+            self._restart(games.done, outcome.masks)
+        infos = self._infos(outcome.masks)
+        infos.update(final)
         if self.render_mode == "human":
             self.render()
-        return self._observe(), rewards, terminations, truncations, infos
+        return self._observe(), outcome.rewards, outcome.terminated, outcome.truncated, infos
 
     def render(self) -> tuple[Any, ...] | None:
         """One picture ``(H', W', 3)`` or drawing per game; with ``"human"`` all games in one window, and None."""
@@ -206,15 +201,43 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
 
     # -- each game ----------------------------------------------------------------------------------------------------
 
+    def game(self, index: int) -> GameOfBatch:
+        """One game, looked at as if it were an environment of its own."""
+        return GameOfBatch(self, index)
+
     def view(self, index: int) -> GameView:
         """A snapshot of one game in words, for drawing."""
-        return make_view(self._packed[index].layout, self._states[index], self._rules, self.settings.rules)
+        games = self._games
+        return make_view(self._packed[index].layout, games.states[index], games.rules, self.settings.rules)
+
+    def layout(self, index: int) -> OvercookedLayout:
+        """The kitchen of one game: the one set for the next reset, else the one being played in."""
+        return (self._chosen[index] or self._packed[index]).layout
+
+    def arrays(self, index: int) -> tuple[Vector, Kitchen, Vector]:
+        """One game's ``(state, kitchen, rules)`` as described in ``vectors``; not copies, to be read only."""
+        return self._games.states[index], self._games.kitchens[index], self._games.rules
+
+    def goals(self, index: int) -> tuple[str, ...]:
+        """Names of the valid goals of one game, in reading order; ``call("goals")`` names those of all games.
+
+        Infos have the mask alone, because naming all games' goals at each step would take longer than the step.
+        """
+        return name_goals(self._packed[index].layout, self._games.goals[index])
+
+    def generator(self, index: int) -> tuple[np.random.Generator, int]:
+        """The random generator of one game, and its seed; made now if it has none yet."""
+        rng = self._rngs[index]
+        if rng is None:
+            rng, self._seeds[index] = seeding.np_random()
+            self._rngs[index] = rng
+        return rng, self._seeds[index]
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
         """Call a method of every game, or get its attribute; as if each were an ``OvercookedEnv``.
 
         Args:
-            name: ``layout``, ``view``, ``valid_goal_names``, ``render``, ``np_random``, ``np_random_seed``, or any
+            name: ``layout``, ``view``, ``arrays``, ``goals``, ``render``, ``np_random``, ``np_random_seed``, or any
                 attribute that all games share, such as ``settings`` or ``render_mode``.
             *args: Arguments of the method.
             **kwargs: Arguments of the method.
@@ -222,7 +245,7 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
         Raises:
             AttributeError: The games have nothing of this name.
         """
-        values = [getattr(GameOfBatch(self, i), name) for i in range(self.num_envs)]
+        values = [getattr(self.game(i), name) for i in range(self.num_envs)]
         return tuple(value(*args, **kwargs) if callable(value) else value for value in values)
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
@@ -253,19 +276,12 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
     @property  # type: ignore[misc]
     def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
         """The random generator of each game."""
-        return tuple(self._rng(i) for i in range(self.num_envs))
+        return tuple(self.generator(i)[0] for i in range(self.num_envs))
 
     @property
     def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
         """The seed of each game's random generator."""
-        return tuple(self._seeds[i] for i in range(self.num_envs) if self._rng(i) is not None)
-
-    def _rng(self, index: int) -> np.random.Generator:
-        rng = self._rngs[index]
-        if rng is None:
-            rng, self._seeds[index] = seeding.np_random()
-            self._rngs[index] = rng
-        return rng
+        return tuple(self.generator(i)[1] for i in range(self.num_envs))
 
     # -- inside -------------------------------------------------------------------------------------------------------
 
@@ -309,8 +325,9 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
         if not self._begun:
             raise ResetNeeded("Cannot call envs.step() before calling envs.reset()")
         if self._ended and self.autoreset_mode == AutoresetMode.DISABLED:
+            over = np.flatnonzero(self._games.done).tolist()
             raise ResetNeeded(
-                f"games {np.flatnonzero(self._done).tolist()} are over and autoreset is disabled: reset them with "
+                f"games {over} are over and autoreset is disabled: reset them with "
                 "envs.reset(options={'reset_mask': mask})"
             )
 
@@ -321,7 +338,7 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
             layout = self.settings.layout
             if layout is None:
                 assert self.settings.distribution is not None
-                layout = self.settings.distribution.sample(self._rng(index))
+                layout = self.settings.distribution.sample(self.generator(index)[0])
             if layout is self._packed[index].layout:
                 return
             packed = self.settings.pack(layout)
@@ -330,7 +347,7 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
         self._make_room(count_pots(packed.layout))
         self._packed[index] = packed
         self._ids[index] = packed.layout.layout_id
-        self._kitchens[index] = packed.kitchen
+        self._games.kitchens[index] = packed.kitchen
         self._routes[index] = packed.routes
 
     def _make_room(self, num_pots: int) -> None:
@@ -338,10 +355,11 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
         if num_pots <= self._num_pots:
             return
         self._num_pots = num_pots
-        self._rules = pack_rules(self.settings.rules, self.settings.shape, 1, num_pots)
-        states = np.full((self.num_envs, int(self._rules[STATE_SIZE])), -1, dtype=np.int32)
-        states[:, : self._states.shape[1]] = self._states
-        self._states = states
+        rules = pack_rules(self.settings.rules, self.settings.shape, 1, num_pots)
+        before = self._games.states
+        states = np.full((self.num_envs, int(rules[STATE_SIZE])), -1, dtype=np.int32)
+        states[:, : before.shape[1]] = before
+        self._games = self._games._replace(states=states, rules=rules)
 
     def _restart(self, which: npt.NDArray[np.bool_], masks: npt.NDArray[np.int8] | None = None) -> npt.NDArray[np.int8]:
         """Start new episodes in some games; returns the action masks with theirs written."""
@@ -349,40 +367,41 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
             masks = np.zeros((self.num_envs, NUM_ACTIONS), dtype=np.int8)
         for i in np.flatnonzero(which):
             self._enter_next(int(i))
-            batch.begin(self._states[i], self._kitchens[i], self._rules, self._goals[i], masks[i])
-        self._drawn[which] = -1
-        self._done[which] = False
-        self._ended = int(np.count_nonzero(self._done))
+            games = self._games
+            batch.begin(games.states[i], games.kitchens[i], games.rules, games.goals[i], masks[i])
+        self._games.drawn[which] = -1
+        self._games.done[which] = False
+        self._ended = int(np.count_nonzero(self._games.done))
         return masks
 
     def _observe(self) -> npt.NDArray[Any]:
-        obs_type = self.settings.obs_type
+        games, obs_type = self._games, self.settings.obs_type
         if obs_type == "grid":
-            batch.refresh_grids(self._states, self._kitchens, self._rules, self._grids, self._drawn)
+            batch.refresh_grids(games.states, games.kitchens, games.rules, games.drawn, self._grids)
             return self._grids.copy()
         if obs_type == "vector":
             features = np.zeros(self._observations_shape, dtype=np.float32)
-            batch.vector_observations(self._states, self._kitchens, self._rules, self._routes, features)
+            batch.vector_observations(games.states, games.kitchens, games.rules, self._routes, features)
             return features
         return np.stack([draw_small(self.view(i)) for i in range(self.num_envs)])
 
     def _infos(self, masks: npt.NDArray[np.int8], which: npt.NDArray[np.bool_] | None = None) -> Infos:
-        """The games' infos as ``SyncVectorEnv`` gathers them; zeros (None) in games that have none."""
-        counts = np.ascontiguousarray(self._states[:, CROSSINGS : DELIVERIES + 1].T, dtype=np.int64)
-        infos: Infos = {}
-        for key, value in (
-            ("valid_goals", self._goals.copy().reshape(self._goals_shape)),
-            ("action_mask", masks),
-            ("layout_id", self._ids.copy()),
-            ("deliveries", counts[1]),
-            ("crossings", counts[0]),
-        ):
-            infos[key] = value
-            infos[f"_{key}"] = (self._everyone if which is None else which).copy()
+        """The games' infos as ``SyncVectorEnv`` gathers them but for names; zeros (None) in games that have none."""
+        states = self._games.states
+        done = states[:, DELIVERIES].astype(np.int64)
+        infos: Infos = {
+            "goal_mask": self._games.goals.copy().reshape(self._goals_shape),
+            "action_mask": masks,
+            "layout_id": self._ids.copy(),
+            "num_done": done,
+            "deliveries": done.copy(),
+            "crossings": states[:, CROSSINGS].astype(np.int64),
+        }
         if which is not None and not which.all():
-            for key in ("valid_goals", "action_mask", "deliveries", "crossings"):
-                infos[key][~which] = 0
-            infos["layout_id"][~which] = None
+            for key, values in infos.items():
+                values[~which] = None if key == "layout_id" else 0
+        told = self._everyone if which is None else which
+        infos |= {"_" + key: told.copy() for key in infos}
         return infos
 
     def _finish(self, done: npt.NDArray[np.bool_], masks: npt.NDArray[np.int8]) -> Infos:

@@ -1,7 +1,7 @@
 """Rollouts and trajectories: what they are, how they are recorded, and the files they are kept in (npz, CSV, Minari).
 
->>> from legible_envs.rollouts import RecordRollouts, write_csv
->>> env = RecordRollouts(gym.make("LegibleOvercooked-v0"))      # doctest: +SKIP
+>>> from legible_envs.rollouts import RecordTrajectories, write_csv
+>>> env = RecordTrajectories(gym.make("LegibleOvercooked-v0"))      # doctest: +SKIP
 >>> gymnasium.utils.play.play(env)                              # doctest: +SKIP
 >>> write_csv("walks.csv", env.trajectories(participant="p1"))  # doctest: +SKIP
 """

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from legible_envs.rollouts.recording import RecordRollouts
+    from legible_envs.rollouts.recording import RecordTrajectories
 
 __all__ = ["to_minari"]
 
 
-def to_minari(recorded: RecordRollouts, dataset_id: str, **metadata: Any) -> Any:
+def to_minari(recorded: RecordTrajectories, dataset_id: str, **metadata: Any) -> Any:
     """Write recorded episodes into Minari's local folder (``MINARI_DATASETS_PATH``) as a new data set.
 
-    An episode that was broken off is marked as truncated at its last step. Each episode's seed and, among its
-    options, its kitchen are kept, so that the recovered environment can play it again.
+    An episode that was broken off is marked as truncated at its last step. Each episode's seed and
+    options are kept, its layout among them (a table's as JSON text): the recovered environment can play it again.
 
     Args:
         recorded: The environment that recorded them.
@@ -48,13 +50,18 @@ def to_minari(recorded: RecordRollouts, dataset_id: str, **metadata: Any) -> Any
             EpisodeBuffer(
                 id=number,
                 seed=episode.seed,
-                options={"layout": episode.views[0].layout.to_ascii()},
+                options={
+                    key: json.dumps(value) if isinstance(value, Mapping) else value
+                    for key, value in episode.options.items()
+                },
                 observations=np.stack(episode.observations),
-                actions=np.array(episode.actions, dtype=np.int64),
+                actions=np.stack(episode.actions),
                 rewards=list(episode.rewards),
                 terminations=list(episode.terminations),
                 truncations=[*episode.truncations[:-1], episode.truncations[-1] or not over],
             )
         )
-    about = {"algorithm_name": "recorded rollouts", "description": "Episodes of LegibleOvercooked-v0."} | metadata
+    spec = recorded.env.spec
+    name = type(recorded.env.unwrapped).__name__ if spec is None else spec.id
+    about = {"algorithm_name": "recorded rollouts", "description": f"Episodes of {name}."} | metadata
     return minari.create_dataset_from_buffers(dataset_id, buffers, env=recorded.env, **about)

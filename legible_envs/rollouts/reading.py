@@ -36,7 +36,7 @@ def read_any(
         return load_trajectories(path)
     except ValueError as error:
         from legible_envs.overcooked.human_play import load_played
-        from legible_envs.rollouts.recording import trajectories_from_played
+        from legible_envs.overcooked.trajectories import trajectories_from_played
 
         try:
             played = load_played(path)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
 
-__all__ = ["JsonSpec", "check_options"]
+__all__ = ["JsonSpec", "check_options", "plain"]
 
 
 def check_options(options: Mapping[str, Any] | None, known: Sequence[str] = ("layout",)) -> Mapping[str, Any]:
@@ -42,15 +42,15 @@ class JsonSpec:
     def spec(self, value: EnvSpec | None) -> None:
         if value is not None:
             value = copy.copy(value)
-            value.kwargs = {key: _plain(argument) for key, argument in value.kwargs.items()}
+            value.kwargs = {key: plain(argument) for key, argument in value.kwargs.items()}
         self._spec = value
 
 
-def _plain(value: Any) -> Any:
-    """Plain data that means the same to the environment."""
+def plain(value: Any) -> Any:
+    """JSON data that means the same to an environment: of a layout, task, array, path, or nests of them."""
     for convert in ("to_ascii", "to_dict", "to_config"):
         if hasattr(value, convert):
-            return _plain(getattr(value, convert)())
+            return plain(getattr(value, convert)())
     if isinstance(value, Enum):
         return value.value
     if isinstance(value, Path):
@@ -58,7 +58,7 @@ def _plain(value: Any) -> Any:
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     if isinstance(value, Mapping):
-        return {key: _plain(entry) for key, entry in value.items()}
+        return {key: plain(entry) for key, entry in value.items()}
     if isinstance(value, tuple | list):
-        return [_plain(entry) for entry in value]
+        return [plain(entry) for entry in value]
     return value

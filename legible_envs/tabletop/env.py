@@ -119,7 +119,7 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
 
     | Key             | Content |
     | --------------- | ------- |
-    | `goals`         | tuple of str: names of the objects that may validly be reached for now, as `valid_goal_names()` gives them; empty while the hand carries an object to its place |
+    | `goals`         | tuple of str: names of the objects that may validly be reached for now, as `env.unwrapped.goals` gives them; empty while the hand carries an object to its place |
     | `goal_mask`     | `(n,)` bool: the same for the `n` objects in the order of the layout |
     | `candidate_set` | `"game"`: these goals are valid in the running game |
     | `start`         | name of where the present reach began in the task: a start of the table, an object, or `elsewhere` |
@@ -338,7 +338,8 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
         """Name of the object in the hand."""
         return self._name(self._game.holding)
 
-    def valid_goal_names(self) -> tuple[str, ...]:
+    @property
+    def goals(self) -> tuple[str, ...]:
         """Names of the objects that the person may validly reach for now, as in ``info["goals"]``."""
         return self._game.goals
 

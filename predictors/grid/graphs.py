@@ -8,12 +8,11 @@ from functools import cached_property, lru_cache
 import numpy as np
 import numpy.typing as npt
 
+from legible_envs.overcooked.grid import NEIGHBOURS
 from legible_envs.overcooked.layout import OvercookedLayout
 from predictors.grid.walk_kernels import cheapest_costs, walk_costs
 
 __all__ = ["WalkGraph", "soft_costs", "station_costs", "walk_graph"]
-
-_MOVES = ((-1, 0), (1, 0), (0, -1), (0, 1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +61,7 @@ def walk_graph(layout: OvercookedLayout, goals: tuple[str, ...]) -> WalkGraph:
     index = np.full(layout.shape, -1, dtype=np.int64)
     index[reach] = np.arange(len(cells))
     padded = np.pad(index, 1, constant_values=-1)
-    neighbours = np.stack([padded[cells[:, 0] + 1 + dr, cells[:, 1] + 1 + dc] for dr, dc in _MOVES], axis=1)
+    neighbours = np.stack([padded[cells[:, 0] + 1 + dr, cells[:, 1] + 1 + dc] for dr, dc in NEIGHBOURS], axis=1)
     access = np.zeros((len(cells), len(goals)))
     for column, goal in enumerate(goals):
         for row, col in layout.access(goal):

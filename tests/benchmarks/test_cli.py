@@ -274,8 +274,7 @@ def walks_of_run(run: Path, tmp_path: Path) -> Path:
 
     from legible_envs.overcooked import OvercookedLayout
     from legible_envs.overcooked.policies import ScriptedPlayer
-    from legible_envs.overcooked.trajectories import record_episode
-    from legible_envs.rollouts import write_csv
+    from legible_envs.rollouts import record_episode, write_csv
 
     layout = OvercookedLayout.from_ascii((run / "best.txt").read_text())
     env = gym.make("LegibleOvercooked-v0", shape=layout.shape, layout=layout)

@@ -27,7 +27,7 @@ from benchmarks.experiments.overcooked.sweep import (
 )
 from legible_envs.overcooked import OvercookedLayout, OvercookedWorkspace
 from legible_envs.overcooked.humans import BoltzmannWalker, PlannerWalker
-from legible_envs.overcooked.humans.fitting import make_way
+from legible_envs.overcooked.humans.fitting import goal_field
 from legible_envs.overcooked.humans.kernels import step_probabilities
 from legible_envs.overcooked.humans.planner_fitting import best_slip, draw_person, fit_planner
 
@@ -62,13 +62,13 @@ def test_steps_are_as_likely_as_they_are_taken() -> None:
     """The share of each first step among many walks, against its likelihood."""
     person = PlannerWalker(depth=2, turn_cost=1.0, slip=0.3)
     rng = np.random.default_rng(0)
-    way = make_way(ROOM, ROOM.stations["onion"])
+    field = goal_field(ROOM, ROOM.stations["onion"])
     paths = [np.array([7 * r + c for r, c in person.walk(ROOM, (3, 2), "onion", rng)]) for _ in range(1500)]
     numbers = np.array([2, 1.0, person.recency, person.fade, 0.0])
     for first in {int(path[1]) for path in paths}:
         taken = [path for path in paths if path[1] == first]
         planned, slipped = np.empty(len(taken[0]) - 1), np.empty(len(taken[0]) - 1)
-        step_probabilities(taken[0], way, numbers, planned, slipped)
+        step_probabilities(taken[0], field, numbers, planned, slipped)
         expected = 0.7 * planned[0] + 0.3 * slipped[0]
         assert len(taken) / len(paths) == pytest.approx(expected, abs=4 * math.sqrt(0.25 / len(paths)))
 

@@ -145,7 +145,7 @@ def simulate(trial: dict[str, Any]) -> list[Trajectory]:
         OvercookedLayout.from_ascii(trial["drawing"]),
         trial["participants"],
         np.random.default_rng(trial["seed"]),
-        walker=draw_person(trial["people"]),
+        population=draw_person(trial["people"]),
         participant=label,
         condition=trial["condition"],
         layout_name=label,

@@ -9,13 +9,14 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.errors import LayoutError
+from legible_envs.overcooked.grid import Cell
+from legible_envs.overcooked.grid_kernels import steps_from
 from legible_envs.overcooked.layout import (
     COUNTER,
     FLOOR,
     OBSTACLE,
     STATION_CODES,
     STATION_TYPES,
-    Cell,
     OvercookedLayout,
 )
 from legible_envs.overcooked.scoring.genome_kernels import Geometry
@@ -23,7 +24,6 @@ from legible_envs.overcooked.scoring.genome_kernels import Geometry
 __all__ = ["DesignRules"]
 
 MAX_SLOTS: Final = 127
-_NEIGHBOURS: Final = ((-1, 0), (1, 0), (0, 1), (0, -1))
 
 
 class DesignRules:
@@ -206,20 +206,25 @@ class DesignRules:
                     rule="access",
                     cell=cell,
                 )
-        reached, frontier = {access[0]}, [access[0]]
-        free = set(self.inner) - blocked
-        while frontier:
-            r, c = frontier.pop()
-            following = {(r + dr, c + dc) for dr, dc in _NEIGHBOURS} & free - reached
-            reached |= following
-            frontier += following
+        steps = self._steps_from(access[0], blocked)
         for name, cell in zip(self.stations, access, strict=True):
-            if cell not in reached:
+            if steps[cell] < 0:
                 raise LayoutError(
                     f"{name} (used from row {cell[0]}, column {cell[1]}) cannot be reached from {self.stations[0]}",
                     rule="reachable",
                     cell=cell,
                 )
+
+    def _steps_from(self, cell: Cell, blocked: set[Cell]) -> npt.NDArray[np.int32]:
+        """``(H, W)`` fewest moves from an inner cell to each other one; -1 where obstacles shut it off."""
+        rows, cols = self.shape
+        floor = np.zeros(self.shape, dtype=np.bool_)
+        floor[1:-1, 1:-1] = True
+        for obstacle in blocked:
+            floor[obstacle] = False
+        steps = np.empty(self.shape, dtype=np.int32)
+        steps_from(np.array([cell[0] * cols + cell[1]]), floor.ravel(), rows, cols, steps.ravel())
+        return steps
 
     def decode(self, genome: npt.NDArray[Any]) -> OvercookedLayout:
         """The layout of a ``(d,)`` genome; raises what :meth:`check` raises."""

@@ -16,7 +16,8 @@ from legible_envs.observer import ObserverModel, Ties, check_prefix
 from legible_envs.overcooked.design import genome_kernels as kernels
 from legible_envs.overcooked.design.keys import KitchenKeys
 from legible_envs.overcooked.design.rules import DesignRules
-from legible_envs.overcooked.layout import INGREDIENTS, STATION_TYPES, Cell, OvercookedLayout
+from legible_envs.overcooked.grid import Cell
+from legible_envs.overcooked.layout import INGREDIENTS, STATION_TYPES, OvercookedLayout
 from legible_envs.overcooked.recipes import PAPER_SOUPS, check_recipes, soup_task
 from legible_envs.overcooked.scoring.boltzmann import HumanModel, HumanName
 from legible_envs.overcooked.scoring.genome_kernels import score_genomes, valid_genomes

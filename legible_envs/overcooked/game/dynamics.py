@@ -9,7 +9,7 @@ A pot accepts an ingredient if afterwards every unfinished pot can still be comp
 soups on the fire, in hands or on counters are taken): two pots never commit to one order. It starts by itself when it
 holds a whole recipe. With ``put_back`` no state is a dead end for a single player: hands can always be emptied where
 they were filled, accepted ingredients and soups are always of use, and soups on counters can be picked up again.
-What remains: several players can stand in each other's way for ever, or, in a kitchen divided by counters, fill all
+What remains: several players can block each other for ever, or, in a kitchen divided by counters, fill all
 counters over which they hand things to each other with things that only the other side could use up.
 """
 
@@ -32,10 +32,8 @@ from legible_envs.overcooked.game.vectors import (
     DISH,
     DISH_CELL,
     DISHES_OUT,
-    EAST,
     HEIGHT,
     INTERACT,
-    NORTH,
     NOTHING_HAPPENS,
     NUM_ORDERS,
     NUM_PLAYERS,
@@ -53,7 +51,6 @@ from legible_envs.overcooked.game.vectors import (
     SOFT,
     SOUP,
     SOUPS_IN_POTS,
-    SOUTH,
     STATE_SIZE,
     STAY,
     STEPS,
@@ -62,23 +59,11 @@ from legible_envs.overcooked.game.vectors import (
     Kitchen,
     Vector,
 )
+from legible_envs.overcooked.grid_kernels import neighbour
 from legible_envs.overcooked.layout import COUNTER, FLOOR, OBSTACLE
 from legible_envs.support.compiled import kernel
 
 # -- the floor plan ---------------------------------------------------------------------------------------------------
-
-
-@kernel
-def neighbour(cell: int, direction: int, rules: Vector) -> int:
-    """Flat cell next to ``cell`` in a direction; -1 outside the grid."""
-    width = rules[WIDTH]
-    if direction == NORTH:
-        return cell - width if cell >= width else -1
-    if direction == SOUTH:
-        return cell + width if cell + width < rules[HEIGHT] * width else -1
-    if direction == EAST:
-        return cell + 1 if cell % width < width - 1 else -1
-    return cell - 1 if cell % width > 0 else -1
 
 
 @kernel
@@ -105,7 +90,7 @@ def label_regions(kitchen: Kitchen, rules: Vector) -> None:
             height -= 1
             cell = stack[height]
             for direction in range(4):
-                following = neighbour(cell, direction, rules)
+                following = neighbour(cell, direction, rules[HEIGHT], rules[WIDTH])
                 if following >= 0 and kitchen[cells + following] == 0 and walkable(kitchen[following], rules):
                     kitchen[cells + following] = label
                     stack[height] = following
@@ -117,7 +102,7 @@ def usable(cell: int, region: int, kitchen: Kitchen, rules: Vector) -> bool:
     """Whether a player of this region can stand next to the cell."""
     cells = rules[HEIGHT] * rules[WIDTH]
     for direction in range(4):
-        beside = neighbour(cell, direction, rules)
+        beside = neighbour(cell, direction, rules[HEIGHT], rules[WIDTH])
         if beside >= 0 and kitchen[cells + beside] == region:
             return True
     return False
@@ -223,7 +208,7 @@ def interaction(state: Vector, kitchen: Kitchen, rules: Vector, player: int) -> 
     """What INTERACT would do for a player now: one of the constants ``NOTHING_HAPPENS`` to ``DELIVERS``."""
     at = AT_PLAYERS + 3 * player
     held = state[at + 2]
-    target = neighbour(state[at], state[at + 1], rules)
+    target = neighbour(state[at], state[at + 1], rules[HEIGHT], rules[WIDTH])
     if target < 0:
         return NOTHING_HAPPENS
     code = kitchen[target]
@@ -276,7 +261,7 @@ def interact(state: Vector, kitchen: Kitchen, rules: Vector, player: int) -> int
         return what
     at = AT_PLAYERS + 3 * player
     held = state[at + 2]
-    target = neighbour(state[at], state[at + 1], rules)
+    target = neighbour(state[at], state[at + 1], rules[HEIGHT], rules[WIDTH])
     if what == TAKES:
         state[at + 2] = kitchen[target] - 2
         if kitchen[target] == DISH_CELL:
@@ -315,7 +300,7 @@ def _move_together(state: Vector, targets: Vector) -> None:
                     stuck[a] = stuck[b] = True
         blocked = False
         for player in range(targets.shape[0]):
-            # Whoever stays may now be in the way of another, so look again.
+            # A player who stays may now block another, so look again.
             if stuck[player] and targets[player] != state[AT_PLAYERS + 3 * player]:
                 targets[player] = state[AT_PLAYERS + 3 * player]
                 blocked = True
@@ -325,13 +310,13 @@ def _move_together(state: Vector, targets: Vector) -> None:
 
 @kernel
 def _target(state: Vector, kitchen: Kitchen, rules: Vector, player: int, action: int) -> int:
-    """Turn a player who moves, and return the cell he would stand on if no other player were there."""
+    """Turn a player who moves, and return the cell they would stand on if no other player were there."""
     at = AT_PLAYERS + 3 * player
     cell = state[at]
     if action >= STAY:
         return cell
     state[at + 1] = action
-    target = neighbour(cell, action, rules)
+    target = neighbour(cell, action, rules[HEIGHT], rules[WIDTH])
     return target if target >= 0 and walkable(kitchen[target], rules) else cell
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from legible_envs.overcooked.game.dynamics import accepts, interaction, is_over, neighbour, usable, walkable
+from legible_envs.overcooked.game.dynamics import accepts, interaction, is_over, usable, walkable
 from legible_envs.overcooked.game.vectors import (
     AT_ITEMS,
     AT_PLAYERS,
@@ -33,6 +33,7 @@ from legible_envs.overcooked.game.vectors import (
     Kitchen,
     Vector,
 )
+from legible_envs.overcooked.grid_kernels import neighbour
 from legible_envs.overcooked.layout import COUNTER, OBSTACLE
 from legible_envs.support.compiled import kernel
 
@@ -41,7 +42,7 @@ __all__ = ["find_actions", "find_goals", "missing_station"]
 
 @kernel
 def missing_station(kitchen: Kitchen, rules: Vector, player: int) -> int:
-    """Cell code of a station that the recipes need and the player cannot get to from his start; 0 if none."""
+    """Cell code of a station that the recipes need and the player cannot get to from their start; 0 if none."""
     cells = rules[HEIGHT] * rules[WIDTH]
     region = kitchen[cells + kitchen[2 * cells + player]]
     for code in range(OBSTACLE + 1, SERVING_CELL + 1):
@@ -148,7 +149,7 @@ def find_actions(state: Vector, kitchen: Kitchen, rules: Vector, player: int, ma
     cell = state[AT_PLAYERS + 3 * player]
     facing = state[AT_PLAYERS + 3 * player + 1]
     for direction in range(4):
-        target = neighbour(cell, direction, rules)
+        target = neighbour(cell, direction, rules[HEIGHT], rules[WIDTH])
         moves = target >= 0 and walkable(kitchen[target], rules)
         mask[direction] = 1 if moves or facing != direction else 0
     mask[STAY] = 1

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from legible_envs.overcooked.game.dynamics import neighbour, walkable
+from legible_envs.overcooked.game.dynamics import walkable
 from legible_envs.overcooked.game.vectors import (
     AT_ITEMS,
     AT_ORDERS,
@@ -27,6 +27,7 @@ from legible_envs.overcooked.game.vectors import (
     Kitchen,
     Vector,
 )
+from legible_envs.overcooked.grid_kernels import neighbour
 from legible_envs.overcooked.layout import COUNTER
 from legible_envs.support.compiled import kernel
 
@@ -140,7 +141,7 @@ def find_routes(kitchen: Kitchen, rules: Vector, routes: npt.NDArray[np.int16]) 
         kitchen: See ``vectors``.
         rules: See ``vectors``.
         routes: ``(7, 2, H*W)``, written: for each station type the steps to a cell beside the nearest one, and the
-            cell of that station; -1 where there is no way.
+            cell of that station; -1 where no path leads.
     """
     cells = rules[HEIGHT] * rules[WIDTH]
     queue = np.empty(cells, dtype=np.int32)
@@ -151,7 +152,7 @@ def find_routes(kitchen: Kitchen, rules: Vector, routes: npt.NDArray[np.int16]) 
             if kitchen[station] != kind + 3:
                 continue
             for direction in range(4):
-                beside = neighbour(station, direction, rules)
+                beside = neighbour(station, direction, rules[HEIGHT], rules[WIDTH])
                 if beside >= 0 and walkable(kitchen[beside], rules) and routes[kind, 0, beside] < 0:
                     routes[kind, 0, beside] = 0
                     routes[kind, 1, beside] = station
@@ -161,7 +162,7 @@ def find_routes(kitchen: Kitchen, rules: Vector, routes: npt.NDArray[np.int16]) 
             cell = queue[head]
             head += 1
             for direction in range(4):
-                beside = neighbour(cell, direction, rules)
+                beside = neighbour(cell, direction, rules[HEIGHT], rules[WIDTH])
                 if beside >= 0 and walkable(kitchen[beside], rules) and routes[kind, 0, beside] < 0:
                     routes[kind, 0, beside] = routes[kind, 0, cell] + 1
                     routes[kind, 1, beside] = routes[kind, 1, cell]
@@ -173,7 +174,7 @@ def find_routes(kitchen: Kitchen, rules: Vector, routes: npt.NDArray[np.int16]) 
 def _describe_player(
     state: Vector, kitchen: Kitchen, rules: Vector, routes: npt.NDArray[np.int16], out: npt.NDArray[np.float32]
 ) -> None:
-    """Entries 0 to 37: where the player is, what he holds, where he can go and how far the stations are."""
+    """Entries 0 to 37: where the player is, what they hold, where they can go, and how far the stations are."""
     height, width = rules[HEIGHT], rules[WIDTH]
     cell = state[AT_PLAYERS]
     row, col = cell // width, cell % width
@@ -182,7 +183,7 @@ def _describe_player(
     out[2 + state[AT_PLAYERS + 1]] = 1.0
     out[6 + min(state[AT_PLAYERS + 2], SOUP)] = 1.0
     for direction in range(4):
-        target = neighbour(cell, direction, rules)
+        target = neighbour(cell, direction, rules[HEIGHT], rules[WIDTH])
         if target >= 0 and walkable(kitchen[target], rules):
             out[13 + direction] = 1.0
     for kind in range(7):

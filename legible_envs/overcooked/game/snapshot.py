@@ -106,5 +106,5 @@ def name_goals(layout: OvercookedLayout, goals: npt.NDArray[np.bool_]) -> tuple[
         layout: The kitchen.
         goals: ``(H*W,)`` or ``(H, W)``.
     """
-    cells = [(int(row), int(col)) for row, col in np.argwhere(np.reshape(goals, layout.shape))]
-    return tuple(layout.station_at(cell) or f"counter@({cell[0]},{cell[1]})" for cell in cells)
+    names = layout.goal_names
+    return tuple([names[cell] for cell in np.flatnonzero(goals).tolist()])

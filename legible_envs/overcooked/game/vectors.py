@@ -1,4 +1,4 @@
-"""The vectors that hold a game for the kernels: where in them things are, and the codes of things.
+"""The vectors that hold a game for the kernels: where each number is, and the codes of items.
 
 A game is three vectors, so that a batch of games is three matrices:
 
@@ -28,10 +28,6 @@ import numpy.typing as npt
 Vector = npt.NDArray[np.int32]
 Kitchen = npt.NDArray[np.int16]
 
-NORTH: Final = 0
-SOUTH: Final = 1
-EAST: Final = 2
-WEST: Final = 3
 STAY: Final = 4
 INTERACT: Final = 5
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from legible_envs.overcooked.layout import Cell, OvercookedLayout
+from legible_envs.overcooked.grid import Cell
+from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.overcooked.recipes import Recipe
 
 __all__ = ["GameView", "Item", "PlayerView", "PotView"]

@@ -10,11 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from legible_envs.overcooked.humans.kernels import Way, beside, find_costs, is_option
+from legible_envs.overcooked.grid_kernels import costs_to, neighbour
+from legible_envs.overcooked.humans.kernels import GoalField, is_option
 from legible_envs.overcooked.layout import FLOOR, OvercookedLayout
 from legible_envs.rollouts.trajectory import Trajectory
 
-__all__ = ["RationalityFit", "RationalitySpread", "fit_rationality", "make_way", "rationality_spread"]
+__all__ = ["RationalityFit", "RationalitySpread", "fit_rationality", "goal_field", "rationality_spread"]
 
 Floats = npt.NDArray[np.float64]
 
@@ -36,7 +37,7 @@ class RationalityFit:
         confidence: Of the interval.
         log_likelihood: At the estimate.
         num_steps: Steps taken, the one into the station included.
-        num_walks: Trajectories.
+        num_trajectories: Trajectories.
         num_participants: Different participants.
     """
 
@@ -47,7 +48,7 @@ class RationalityFit:
     confidence: float
     log_likelihood: float
     num_steps: int
-    num_walks: int
+    num_trajectories: int
     num_participants: int
 
 
@@ -102,12 +103,13 @@ def fit_rationality(
     does not. The log-likelihood is concave, so the estimate is the only one.
 
     Args:
-        trajectories: Walks with a layout and a goal, consecutive repeats dropped.
+        trajectories: With a layout and a goal, consecutive repeats dropped.
         confidence: Of the interval, in (0, 1).
-        cell_costs: ``(H, W)`` cost of stepping on each cell, 1 if None; walks must then be of one shape of kitchen.
+        cell_costs: ``(H, W)`` cost of stepping on each cell, 1 if None; with costs, all kitchens must be of one shape.
 
     Raises:
-        ValueError: No step with a choice; a walk without layout or goal, that does not fit its layout, or that jumps.
+        ValueError: No step with a choice; a trajectory without layout or goal, that does not fit its layout, or
+            that jumps.
 
     Example:
         >>> from legible_envs.overcooked import OvercookedLayout
@@ -126,17 +128,17 @@ def fit_rationality(
 
 
 def rationality_spread(
-    trajectories: Iterable[Trajectory], *, confidence: float = 0.95, min_walks: int = 10
+    trajectories: Iterable[Trajectory], *, confidence: float = 0.95, min_trajectories: int = 10
 ) -> RationalitySpread:
     """How much participants differ in rationality.
 
     Args:
-        trajectories: As for :func:`fit_rationality`; of one kitchen, or kitchens that everybody walked in.
+        trajectories: As for :func:`fit_rationality`; of one kitchen, or of kitchens that every participant walked in.
         confidence: Of each interval.
-        min_walks: Participants with fewer walks are left out.
+        min_trajectories: Participants with fewer trajectories are left out.
 
     Raises:
-        ValueError: Fewer than two participants with enough walks and an estimate that is neither 0 nor infinite.
+        ValueError: Fewer than two participants with enough trajectories and an estimate that is neither 0 nor infinite.
     """
     by_name: dict[str, list[Trajectory]] = {}
     for walk in trajectories:
@@ -144,11 +146,13 @@ def rationality_spread(
     fits = {
         name: fit_rationality(walks, confidence=confidence)
         for name, walks in sorted(by_name.items())
-        if len(walks) >= min_walks
+        if len(walks) >= min_trajectories
     }
     usable = [fit for fit in fits.values() if 0 < fit.rationality < math.inf]
     if len(usable) < 2:
-        raise ValueError(f"a spread needs two participants with {min_walks} walks each; got {len(usable)}")
+        raise ValueError(
+            f"a spread needs two participants with {min_trajectories} trajectories each; got {len(usable)}"
+        )
     logs = np.log([fit.rationality for fit in usable])
     errors = np.array([fit.standard_error / fit.rationality for fit in usable])
     variance = float(logs.var(ddof=1))
@@ -157,42 +161,47 @@ def rationality_spread(
 
 
 def _collect(walks: Sequence[Trajectory], names: Sequence[str], cell_costs: npt.ArrayLike | None) -> _Steps:
-    ways: dict[tuple[object, str], Way] = {}
+    fields: dict[tuple[object, str], GoalField] = {}
     excess, taken, who = [], [], []
     for number, walk in enumerate(walks):
         if not isinstance(walk.layout, OvercookedLayout) or walk.goal is None or not walk.is_grid:
-            raise ValueError(f"walk {number} has no kitchen, no goal, or positions instead of cells")
+            raise ValueError(f"trajectory {number} has no kitchen, no goal, or positions instead of cells")
         key = walk.layout, walk.goal
-        if key not in ways:
-            ways[key] = make_way(walk.layout, walk.layout.stations[walk.goal], cell_costs)
-        way = ways[key]
-        cells = [int(row) * way.width + int(col) for row, col in walk.states.tolist()]
+        if key not in fields:
+            fields[key] = goal_field(walk.layout, walk.layout.stations[walk.goal], cell_costs)
+        field = fields[key]
+        cells = [int(row) * field.width + int(col) for row, col in walk.states.tolist()]
         for i, (before, after) in enumerate(itertools.pairwise(cells)):
-            options = [beside(before, direction, way.height, way.width) for direction in range(4)]
-            if not way.floor[before] or after not in options or not is_option(after, way):
-                (a, b), (c, d) = divmod(before, way.width), divmod(after, way.width)
+            options = [neighbour(before, direction, field.height, field.width) for direction in range(4)]
+            if not field.floor[before] or after not in options or not is_option(after, field):
+                (a, b), (c, d) = divmod(before, field.width), divmod(after, field.width)
                 raise ValueError(
-                    f"walk {number}: the step after state {i}, from row {a}, column {b} to row {c}, column {d}, is "
-                    f"not to a neighbouring floor cell or into {walk.goal!r}"
+                    f"trajectory {number}: the step after state {i}, from row {a}, column {b} to row {c}, column {d}, "
+                    f"is not to a neighbouring floor cell or into {walk.goal!r}"
                 )
-            costs = np.array([_cost(option, way) for option in options])
+            costs = np.array([_cost(option, field) for option in options])
             excess.append(costs - costs.min())
-            taken.append(_cost(after, way) - costs.min())
+            taken.append(_cost(after, field) - costs.min())
             who.append(names.index(walk.participant))
     table = np.array(excess).reshape(-1, 4)
     if not len(table) or not (np.isfinite(table).sum(axis=1) > 1).any():
-        raise ValueError(f"{len(walks)} walks have no step at which there was a choice")
+        raise ValueError(f"{len(walks)} trajectories have no step at which there was a choice")
     return _Steps(table, np.array(taken), np.array(who, dtype=np.intp))
 
 
-def _cost(cell: int, way: Way) -> float:
-    if not is_option(cell, way):
+def _cost(cell: int, field: GoalField) -> float:
+    if not is_option(cell, field):
         return math.inf
-    return 1.0 if cell == way.station else float(way.costs[cell] + way.best[cell])
+    return 1.0 if cell == field.station else float(field.costs[cell] + field.cost_to_go[cell])
 
 
-def make_way(layout: OvercookedLayout, station: Sequence[int], cell_costs: npt.ArrayLike | None = None) -> Way:
-    """The way to a station of a layout for the kernels.
+def goal_field(layout: OvercookedLayout, station: Sequence[int], cell_costs: npt.ArrayLike | None = None) -> GoalField:
+    """The costs to go to a station of a layout, for the kernels.
+
+    Args:
+        layout: The kitchen.
+        station: ``(row, col)`` of the station.
+        cell_costs: ``(H, W)`` cost of stepping on each cell; 1 if None.
 
     Raises:
         ValueError: Costs of another shape, or costs of floor cells that are not positive and finite.
@@ -204,13 +213,13 @@ def make_way(layout: OvercookedLayout, station: Sequence[int], cell_costs: npt.A
         raise ValueError(f"cell costs must have the kitchen's shape {layout.shape}, got {costs.shape}")
     if not np.isfinite(costs.ravel()[floor]).all() or (costs.ravel()[floor] <= 0).any():
         raise ValueError("cell costs of floor cells must be finite and greater than 0")
-    best = np.empty(height * width)
+    cost_to_go = np.empty(height * width)
     target = int(station[0]) * width + int(station[1])
-    find_costs(height, width, floor, costs.ravel(), target, best)
-    return Way(height, width, floor, costs.ravel(), target, best)
+    costs_to(target, floor, costs.ravel(), height, width, cost_to_go)
+    return GoalField(height, width, floor, costs.ravel(), target, cost_to_go)
 
 
-def _fit(steps: _Steps, confidence: float, num_walks: int, num_participants: int) -> RationalityFit:
+def _fit(steps: _Steps, confidence: float, num_trajectories: int, num_participants: int) -> RationalityFit:
     from scipy.optimize import brentq
     from scipy.stats import chi2
 
@@ -241,5 +250,5 @@ def _fit(steps: _Steps, confidence: float, num_walks: int, num_participants: int
             correction = num_participants / (num_participants - 1)
             clustered = math.sqrt(correction * float((by_person**2).sum())) / float(information.sum())
     return RationalityFit(
-        best, (low, high), error, clustered, confidence, greatest, len(steps.taken), num_walks, num_participants
+        best, (low, high), error, clustered, confidence, greatest, len(steps.taken), num_trajectories, num_participants
     )

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from legible_envs.overcooked.humans.fitting import fit_rationality, make_way, rationality_spread
-from legible_envs.overcooked.humans.kernels import Way
+from legible_envs.overcooked.humans.fitting import fit_rationality, goal_field, rationality_spread
+from legible_envs.overcooked.humans.kernels import GoalField
 from legible_envs.overcooked.humans.simulation import BoltzmannWalker, PlannerWalker, Walker
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["PlannerFit", "best_slip", "draw_person", "fit_boltzmann", "fit_planner"]
 
 Floats = npt.NDArray[np.float64]
-Recorded = list[tuple[npt.NDArray[np.int64], Way, str]]
+Recorded = list[tuple[npt.NDArray[np.int64], GoalField, str]]
 
 GRID: Final[Mapping[str, tuple[float, ...]]] = {
     "depth": (2, 3, 4),
@@ -29,11 +29,11 @@ GRID: Final[Mapping[str, tuple[float, ...]]] = {
     "fade": (0.5, 0.7, 0.8, 0.9, 0.95),
 }
 """Values of the planner's parameters that are tried. Costs decide what is best alone, not by how much: between two
-values of the grid the likelihood hardly changes, but in steps, so that nothing smooth could be climbed. Who looks one
-step ahead would fit the recorded kitchens, which have no dead ends, better still, and lose their way for hundreds of
-steps among virtual obstacles; two is the least."""
-MIN_WALKS: Final = 10
-"""Whoever walked less often is not fitted alone."""
+values of the grid the likelihood hardly changes, but in steps, so that nothing smooth could be climbed. A depth of one
+step would fit the recorded kitchens, which have no dead ends, better still, but such participants get lost for hundreds
+of steps among virtual obstacles; two is the least."""
+MIN_TRAJECTORIES: Final = 10
+"""Fewest trajectories of a participant who is fitted alone."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ def fit_boltzmann(walks: Sequence[Trajectory]) -> list[dict[str, Any]]:
         taken out, and the ``log_likelihood`` of all steps at one common rationality), with empty ``participant``; then
         one for each person with ``rationality``.
     """
-    spread = rationality_spread(walks, min_walks=MIN_WALKS)
+    spread = rationality_spread(walks, min_trajectories=MIN_TRAJECTORIES)
     common = fit_rationality(walks)
     whole = {
         "walker": "boltzmann",
@@ -78,24 +78,24 @@ def fit_boltzmann(walks: Sequence[Trajectory]) -> list[dict[str, Any]]:
         "spread": spread.sd,
         "log_likelihood": common.log_likelihood,
         "steps": common.num_steps,
-        "walks": common.num_walks,
+        "walks": common.num_trajectories,
         "people": common.num_participants,
     }
     each = [
-        {"walker": "boltzmann", "participant": name, "rationality": fit.rationality, "walks": fit.num_walks}
+        {"walker": "boltzmann", "participant": name, "rationality": fit.rationality, "walks": fit.num_trajectories}
         for name, fit in spread.fits.items()
     ]
     return [whole, *each]
 
 
 def fit_planner(walks: Sequence[Trajectory], grid: Mapping[str, Sequence[float]] = GRID) -> PlannerFit:
-    """Fit the planner to recorded walks.
+    """Fit the planner to recorded trajectories.
 
-    All parameters are fitted for everybody together, one after the other over a grid until none is better changed alone
-    (the rate of slips exactly, for each); then each person's own cost of turning and rate of slips.
+    All parameters are fitted for all participants together, one after the other over a grid until none is better
+    changed alone (the rate of slips exactly, for each); then each participant's own cost of turning and rate of slips.
 
     Args:
-        walks: Walks with a kitchen, a goal and a participant.
+        walks: Trajectories with a kitchen, a goal and a participant.
         grid: Values tried.
     """
     recorded = _prepared(walks)
@@ -121,7 +121,7 @@ def fit_planner(walks: Sequence[Trajectory], grid: Mapping[str, Sequence[float]]
     turning = [(turn, *steps({**best, "turn_cost": turn})) for turn in grid["turn_cost"]]
     people = {}
     for name, number in Counter(walk.participant for walk in walks).items():
-        if number >= MIN_WALKS:
+        if number >= MIN_TRAJECTORIES:
             own = [(turn, *best_slip(planned[who == name], slipped[who == name])) for turn, planned, slipped in turning]
             turn, own_slip, _ = max(own, key=lambda fit: fit[2])
             people[name] = (float(turn), own_slip)
@@ -134,8 +134,8 @@ def best_slip(planned: Floats, slipped: Floats) -> tuple[float, float]:
     """The rate of slips that makes steps most likely, and their log-likelihood; it is concave in the rate.
 
     Args:
-        planned: ``(m,)`` probability of each step for who never slips.
-        slipped: ``(m,)`` for who steps anywhere.
+        planned: ``(m,)`` probability of each step without slips.
+        slipped: ``(m,)`` probability of each step where every step is a slip.
     """
     from scipy.optimize import minimize_scalar
 
@@ -147,30 +147,30 @@ def best_slip(planned: Floats, slipped: Floats) -> tuple[float, float]:
 
 
 def _prepared(walks: Sequence[Trajectory]) -> Recorded:
-    """Paths as cell numbers, the way to each goal, and who walked."""
+    """Paths as cell numbers, the costs to go to each goal, and the participant."""
     from legible_envs.overcooked.layout import OvercookedLayout
 
-    ways: dict[tuple[object, str], Way] = {}
+    fields: dict[tuple[object, str], GoalField] = {}
     found: Recorded = []
     for walk in walks:
         if not isinstance(walk.layout, OvercookedLayout) or walk.goal is None:
-            raise ValueError("walks to fit people on need a kitchen and a goal")
+            raise ValueError("trajectories to fit people on need a kitchen and a goal")
         key = walk.layout, walk.goal
-        if key not in ways:
-            ways[key] = make_way(walk.layout, walk.layout.stations[walk.goal])
+        if key not in fields:
+            fields[key] = goal_field(walk.layout, walk.layout.stations[walk.goal])
         path = walk.states[:, 0].astype(np.int64) * walk.layout.shape[1] + walk.states[:, 1]
-        found.append((path.astype(np.int64), ways[key], walk.participant))
+        found.append((path.astype(np.int64), fields[key], walk.participant))
     return found
 
 
-def _step_probabilities(recorded: Recorded, numbers: Floats) -> tuple[Floats, Floats]:
+def _step_probabilities(recorded: Recorded, params: Floats) -> tuple[Floats, Floats]:
     """``(m,)`` each of all steps of all walks, as :func:`step_probabilities` gives them."""
     from legible_envs.overcooked.humans.kernels import step_probabilities
 
     ends = np.cumsum([0, *(len(path) - 1 for path, *_ in recorded)])
     planned, slipped = np.empty(ends[-1]), np.empty(ends[-1])
-    for (path, way, _), a, b in zip(recorded, ends, ends[1:], strict=False):
-        step_probabilities(path, way, numbers, planned[a:b], slipped[a:b])
+    for (path, field, _), a, b in zip(recorded, ends, ends[1:], strict=False):
+        step_probabilities(path, field, params, planned[a:b], slipped[a:b])
     return planned, slipped
 
 
@@ -178,7 +178,7 @@ def draw_person(people: Mapping[str, Any]) -> Callable[..., Walker]:
     """What draws a person for :func:`~legible_envs.overcooked.humans.simulate_participants`.
 
     Args:
-        people: Plain data: ``walker`` and its numbers, as :func:`benchmarks.experiments.overcooked.sweep.people_of`
+        people: Plain data: ``walker`` and its parameters, as :func:`benchmarks.experiments.overcooked.sweep.people_of`
             makes them. Boltzmann people have lognormal rationality; planners the cost of turning and the slips of one
             recorded person each, drawn at random.
     """
@@ -194,8 +194,8 @@ def draw_person(people: Mapping[str, Any]) -> Callable[..., Walker]:
 
         def draw(shape: tuple[int, int], rng: np.random.Generator) -> Walker:
             turn_cost, slip = people["people"][int(rng.integers(len(people["people"])))]
-            numbers = {key: people[key] for key in ("depth", "recency", "fade")}
-            return PlannerWalker.draw(shape, rng, preference=preference, turn_cost=turn_cost, slip=slip, **numbers)
+            shared = {key: people[key] for key in ("depth", "recency", "fade")}
+            return PlannerWalker.draw(shape, rng, preference=preference, turn_cost=turn_cost, slip=slip, **shared)
 
     else:
         raise ValueError(f"people are 'boltzmann' or 'planner', got {kind!r}")

@@ -1,9 +1,9 @@
-"""Simulated people in kitchens: two kinds of walkers, people who differ, and whole task executions.
+"""Simulated participants in kitchens: two models of how people walk, differences between them, and whole tasks.
 
 :class:`BoltzmannWalker` is the noisily rational walker that ``human="boltzmann"`` scores and
 :func:`fit_rationality` fits to recorded play. :class:`PlannerWalker` errs for other reasons: it sees only a few steps
 ahead, dislikes turning, and avoids where it has just been. A layout, or a predictor, that was made with one model of
-people should be judged with the other, too.
+people should be evaluated with the other, too.
 
 Both walk from station to station: floor cells, then the goal station. Time passes in ticks. Before each step a person
 stands idle or looks around for a while (each tick with probability ``idle`` and ``turn``); a step takes a tick and
@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, Final, Literal, get_args
+from typing import Any, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -61,10 +61,7 @@ class BoltzmannWalker(Walker):
 
     Args:
         rationality: Per unit of cost; 0 walks at random. 1.1 to 1.7 in recorded play.
-        preferences: See :class:`Walker`.
-        idle: See :class:`Walker`.
-        turn: See :class:`Walker`.
-        tick: See :class:`Walker`.
+        **arguments: Of every :class:`Walker`: ``preferences``, ``idle``, ``turn``, ``tick``.
 
     Example:
         >>> import numpy as np
@@ -80,7 +77,7 @@ class BoltzmannWalker(Walker):
         self.rationality = check_finite("rationality", rationality, minimum=0.0)
 
     @property
-    def numbers(self) -> Floats:
+    def params(self) -> Floats:
         """``[rationality]``."""
         return np.array([self.rationality])
 
@@ -118,10 +115,10 @@ class BoltzmannWalker(Walker):
 class PlannerWalker(Walker):
     """A person who plans a few steps ahead, dislikes turning, and avoids where it was just before.
 
-    At each step all ways of ``depth`` steps are compared (shorter ones that end in the goal, too) by the cost of their
+    At each step all paths of ``depth`` steps are compared (shorter ones that end in the goal, too) by the cost of their
     cells, ``turn_cost`` for every change of direction, ``recency`` times the memory of every cell on them, and the
     beeline (Manhattan distance) from their end to the goal: what lies behind the next corner is not known. The first
-    step of a best way is taken, ties broken at random; with probability ``slip`` any step. The memory of a cell grows
+    step of a best path is taken, ties broken at random; with probability ``slip`` any step. The memory of a cell grows
     by 1 with each visit and fades by ``fade`` with each step. In a kitchen with dead ends such people walk into them.
 
     Args:
@@ -130,10 +127,7 @@ class PlannerWalker(Walker):
         recency: Cost of a cell that was just visited.
         fade: What is left of a memory after a step, in [0, 1).
         slip: Probability of a random step, in [0, 1]. With 0, people may circle for ever in kitchens with dead ends.
-        preferences: See :class:`Walker`.
-        idle: See :class:`Walker`.
-        turn: See :class:`Walker`.
-        tick: See :class:`Walker`.
+        **arguments: Of every :class:`Walker`: ``preferences``, ``idle``, ``turn``, ``tick``.
     """
 
     kind = PLANNER
@@ -159,7 +153,7 @@ class PlannerWalker(Walker):
             raise ValueError(f"fade must be in [0, 1) and slip in [0, 1], got {fade!r} and {slip!r}")
 
     @property
-    def numbers(self) -> Floats:
+    def params(self) -> Floats:
         """``[depth, turn_cost, recency, fade, slip]``."""
         return np.array([self.depth, self.turn_cost, self.recency, self.fade, self.slip])
 
@@ -186,8 +180,8 @@ class PlannerWalker(Walker):
         return cls(preferences=draw_preferences(shape, rng, preference), **{**drawn, **arguments})
 
 
-WalkerName = Literal["boltzmann", "planner"]
-_WALKERS: Final[dict[str, Any]] = {"boltzmann": BoltzmannWalker.draw, "planner": PlannerWalker.draw}
+PopulationName = Literal["boltzmann", "planner"]
+_POPULATIONS: Final[dict[str, Any]] = {"boltzmann": BoltzmannWalker.draw, "planner": PlannerWalker.draw}
 
 
 def simulate_participants(
@@ -195,15 +189,15 @@ def simulate_participants(
     n: int,
     rng: np.random.Generator,
     *,
-    walker: WalkerName | Callable[..., Walker] = "boltzmann",
     task: TaskGraph | None = None,
+    population: PopulationName | Callable[..., Walker] | None = None,
     executions: int = 1,
     participant: str = "person",
     condition: str = "simulated",
     layout_name: str = "",
     **settings: Any,
 ) -> list[Trajectory]:
-    """The reaches of people who each do a whole task, in a uniformly random valid sequence.
+    """Trajectories of simulated participants who each do a whole task, in a uniformly random valid sequence.
 
     Where the task is at a stage (start, valid goals), the person walks from the cell it stands on to the goal of the
     sequence: that is a trajectory, with the valid goals as candidates (candidate set ``task``). The legs that follow,
@@ -213,25 +207,27 @@ def simulate_participants(
 
     Args:
         layout: The kitchen.
-        n: Number of people.
+        n: Number of participants.
         rng: Source of all randomness.
-        walker: ``"boltzmann"`` or ``"planner"`` people, drawn anew for each participant, or what draws one, called with
-            (shape, rng).
         task: The task over station types; the paper's three soups if None.
-        executions: How often each person does the task.
+        population: What participants are drawn from, each anew: ``"boltzmann"`` (also None) or ``"planner"``, or a
+            callable that makes one participant's walker, called with (shape, rng).
+        executions: How often each participant does the task.
         participant: Names are ``"{participant}/0"``, ``"{participant}/1"``, ….
         condition: Of all trajectories.
         layout_name: Of all trajectories.
-        **settings: Of the people: see :meth:`BoltzmannWalker.draw` and :meth:`PlannerWalker.draw`.
+        **settings: Of the population: arguments of :meth:`BoltzmannWalker.draw` or :meth:`PlannerWalker.draw`.
 
     Raises:
         LayoutError: The task cannot be done in this kitchen.
-        ValueError: Unknown walkers.
+        ValueError: Unknown population.
     """
     task = task or soup_task()
-    if isinstance(walker, str) and walker not in _WALKERS:
-        raise ValueError(f"walker must be one of {list(get_args(WalkerName))} or a callable, got {walker!r}")
-    draw = _WALKERS[walker] if isinstance(walker, str) else walker
+    if population is None:
+        population = "boltzmann"
+    if isinstance(population, str) and population not in _POPULATIONS:
+        raise ValueError(f"`population` must be one of {list(_POPULATIONS)} or a callable, got {population!r}")
+    draw = _POPULATIONS[population] if isinstance(population, str) else population
     found: list[Trajectory] = []
     for number in range(n):
         person = draw(layout.shape, rng, **settings)

@@ -1,31 +1,30 @@
-"""People who walk in kitchens: what every simulated walker can do, whatever decides its steps."""
+"""Simulated participants who walk in kitchens: all that does not depend on how they decide their steps."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, ClassVar, Final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from legible_envs.errors import LayoutError
-from legible_envs.overcooked.humans.fitting import make_way
-from legible_envs.overcooked.humans.kernels import Way, beside, sample_times, sample_walk
-from legible_envs.overcooked.layout import Cell, OvercookedLayout
+from legible_envs.overcooked.grid import Cell
+from legible_envs.overcooked.grid_kernels import neighbour
+from legible_envs.overcooked.humans.fitting import goal_field
+from legible_envs.overcooked.humans.kernels import GoalField, sample_times, sample_walk
+from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.rollouts.trajectory import Trajectory
 from legible_envs.support.validation import check_finite
-
-if TYPE_CHECKING:
-    from legible_envs.overcooked.policies import WalkingPlayer
 
 __all__ = ["Walker", "draw_one", "draw_preferences", "in_reach"]
 
 Floats = npt.NDArray[np.float64]
 
 LONGEST: Final = 100_000
-"""Steps after which a walk counts as lost: the walker cannot find the goal."""
+"""Steps after which a path counts as lost: the walker cannot find the goal."""
 
 
 class Walker(ABC):
@@ -55,16 +54,16 @@ class Walker(ABC):
         self.turn = check_finite("turn", turn, minimum=0.0)
         self.tick = check_finite("tick", tick, minimum=0.0)
         if self.idle + self.turn >= 1:
-            raise ValueError(f"idle + turn must be less than 1, got {idle!r} + {turn!r}: nobody would ever move")
+            raise ValueError(f"idle + turn must be less than 1, got {idle!r} + {turn!r}: the person would never move")
         self.preferences = None if preferences is None else np.array(preferences, dtype=np.float64)
         if self.preferences is not None and not ((self.preferences > 0) & (self.preferences < np.inf)).all():
             raise ValueError("preferences are costs of stepping on cells: they must be finite and greater than 0")
-        self._ways = lru_cache(maxsize=256)(self._find_way)
+        self._fields = lru_cache(maxsize=256)(self._make_field)
 
     @property
     @abstractmethod
-    def numbers(self) -> Floats:
-        """What the kernels need to know of this person; see :mod:`legible_envs.overcooked.humans.kernels`."""
+    def params(self) -> Floats:
+        """``(k,)`` parameters of this person for the kernels; see :mod:`legible_envs.overcooked.humans.kernels`."""
 
     def costs(self, shape: tuple[int, int]) -> Floats:
         """``(H, W)`` cost of stepping on each cell.
@@ -79,7 +78,7 @@ class Walker(ABC):
         return self.preferences
 
     def walk(self, layout: OvercookedLayout, start: str | Cell, goal: str, rng: np.random.Generator) -> list[Cell]:
-        """The cells of one walk: floor cells, then the goal's own.
+        """The cells of one path: floor cells, then the goal's own.
 
         Args:
             layout: The kitchen.
@@ -88,11 +87,11 @@ class Walker(ABC):
             rng: Source of randomness.
 
         Raises:
-            LayoutError: No such station, a start that is no floor cell, or no way.
+            LayoutError: No such station, a start that is no floor cell, or no path.
             RuntimeError: The person did not find the goal in 100,000 steps.
         """
         cell = self._start_cell(layout, start, goal, rng)
-        path = self._walk(self._way(layout, goal), cell, rng)
+        path = self._walk(self._field(layout, goal), cell, rng)
         return [divmod(int(index), layout.shape[1]) for index in path]
 
     def sample(
@@ -106,13 +105,13 @@ class Walker(ABC):
         candidates: Sequence[str] | None = None,
         **labels: Any,
     ) -> list[Trajectory]:
-        """Walks from a station to goals.
+        """Trajectories from a station to goals.
 
         Args:
             layout: The kitchen.
-            start: Name of the station left; each walk begins at one of its access cells.
-            goals: The goal, or goals of which each walk draws one.
-            n: How many walks.
+            start: Name of the station left; each trajectory begins at one of its access cells.
+            goals: The goal, or goals of which one is drawn for each trajectory.
+            n: How many trajectories.
             rng: Source of randomness.
             candidates: What an observer takes for possible; the goals if None.
             **labels: Further attributes of :class:`~legible_envs.rollouts.Trajectory`, such as ``participant``.
@@ -140,38 +139,32 @@ class Walker(ABC):
             )
         return found
 
-    def policy(self, env: Any, rng: np.random.Generator) -> WalkingPlayer:
-        """This person as a policy for ``LegibleOvercooked-v0``, one game or many: ``policy(obs, info) -> action``."""
-        from legible_envs.overcooked.policies import WalkingPlayer
-
-        return WalkingPlayer(env, self, rng)
-
     def seconds(self, ticks: npt.NDArray[np.int64]) -> Floats:
         """When ticks end."""
         return np.asarray(ticks * self.tick, dtype=np.float64)
 
-    def _way(self, layout: OvercookedLayout, goal: str) -> Way:
+    def _field(self, layout: OvercookedLayout, goal: str) -> GoalField:
         if goal not in layout.stations:
             raise LayoutError(f"no station {goal!r}; this kitchen has {list(layout.stations)}", rule="station")
-        way: Way = self._ways(layout, goal)
-        return way
+        field: GoalField = self._fields(layout, goal)
+        return field
 
     def _start_cell(self, layout: OvercookedLayout, start: str | Cell, goal: str, rng: np.random.Generator) -> Cell:
         """The cell of a start, from which the goal can be reached; one of several at random."""
         cells = layout.access(start) if isinstance(start, str) else ((int(start[0]), int(start[1])),)
         if not isinstance(start, str) and not layout.is_floor(cells[0]):
             raise LayoutError(f"row {start[0]}, column {start[1]} is no floor cell", rule="start", cell=cells[0])
-        way = self._way(layout, goal)
-        near = [cell for cell in cells if way.best[cell[0] * way.width + cell[1]] < np.inf]
+        field = self._field(layout, goal)
+        near = [cell for cell in cells if field.cost_to_go[cell[0] * field.width + cell[1]] < np.inf]
         return draw_one(near, f"no way to {goal!r} from {start!r}", rng)
 
-    def _find_way(self, layout: OvercookedLayout, goal: str) -> Way:
-        return make_way(layout, layout.stations[goal], self.costs(layout.shape))
+    def _make_field(self, layout: OvercookedLayout, goal: str) -> GoalField:
+        return goal_field(layout, layout.stations[goal], self.costs(layout.shape))
 
-    def _walk(self, way: Way, cell: Cell, rng: np.random.Generator) -> npt.NDArray[np.int64]:
-        start = cell[0] * way.width + cell[1]
+    def _walk(self, field: GoalField, cell: Cell, rng: np.random.Generator) -> npt.NDArray[np.int64]:
+        start = cell[0] * field.width + cell[1]
         path = np.empty(LONGEST, dtype=np.int64)
-        length = sample_walk(self.kind, self.numbers, start, way, rng, path)
+        length = sample_walk(self.kind, self.params, start, field, rng, path)
         if length == 0:
             raise RuntimeError(f"{self!r} did not find the goal within {LONGEST:,} steps")
         return path[:length].copy()
@@ -180,14 +173,14 @@ class Walker(ABC):
         self, layout: OvercookedLayout, cell: Cell, start: str, goal: str, rng: np.random.Generator
     ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
         """``(T, 2)`` cells from a floor cell into a station, and ``(T,)`` ticks, from a person who faces ``start``."""
-        way = self._way(layout, goal)
-        path = self._walk(way, cell, rng)
+        field = self._field(layout, goal)
+        path = self._walk(field, cell, rng)
         row, col = layout.stations[start]
-        around = [beside(int(path[0]), direction, way.height, way.width) for direction in range(4)]
-        facing = around.index(row * way.width + col)
+        around = [neighbour(int(path[0]), direction, field.height, field.width) for direction in range(4)]
+        facing = around.index(row * field.width + col)
         ticks = np.empty(len(path), dtype=np.int64)
-        sample_times(path, facing, way, self.idle, self.turn, rng, ticks)
-        return np.column_stack(np.divmod(path, way.width)), ticks
+        sample_times(path, facing, field, self.idle, self.turn, rng, ticks)
+        return np.column_stack(np.divmod(path, field.width)), ticks
 
     def __reduce__(self) -> tuple[object, ...]:
         return _rebuild, (type(self), {key: getattr(self, key) for key in self._parameters()})
@@ -208,15 +201,15 @@ def draw_one(cells: Sequence[Cell], what: str, rng: np.random.Generator) -> Cell
 
 
 @lru_cache(maxsize=512)
-def _shortest_way(layout: OvercookedLayout, name: str) -> Way:
-    """The way of a person without preferences, who counts steps."""
-    return make_way(layout, layout.stations[name])
+def _shortest_field(layout: OvercookedLayout, name: str) -> GoalField:
+    """The costs to go of a person without preferences: numbers of steps."""
+    return goal_field(layout, layout.stations[name])
 
 
 def in_reach(layout: OvercookedLayout, cell: Cell, kind: str) -> list[str]:
     """Stations of one type that can be walked to, the nearest first."""
     at = cell[0] * layout.shape[1] + cell[1]
-    steps = {name: float(_shortest_way(layout, name).best[at]) for name in layout.named(kind)}
+    steps = {name: float(_shortest_field(layout, name).cost_to_go[at]) for name in layout.named(kind)}
     found = sorted((name for name in steps if steps[name] < np.inf), key=lambda name: steps[name])
     if not found:
         raise LayoutError(

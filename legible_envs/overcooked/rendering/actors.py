@@ -8,6 +8,7 @@ from typing import Final
 
 from legible_envs.drawing.canvas import Canvas, Sprite, mix
 from legible_envs.overcooked.game.view import Item, PotView
+from legible_envs.overcooked.grid import EAST, NORTH, SOUTH, WEST
 from legible_envs.overcooked.rendering.food import draw_item, draw_pieces, soup_colour
 from legible_envs.overcooked.rendering.palette import PALETTE, PLAYER_COLOURS
 from legible_envs.overcooked.rendering.tiles import COUNTER_TOP
@@ -17,7 +18,6 @@ __all__ = ["CHEF_RISE", "chef_sprite", "draw_tick", "pot_sprite"]
 CHEF_RISE: Final = 0.3
 """How far a chef's hat rises above the cell stood on, in tiles."""
 
-NORTH, SOUTH, EAST, WEST = range(4)
 _STEPS_OF_PROGRESS: Final = 40
 
 

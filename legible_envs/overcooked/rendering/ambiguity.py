@@ -12,7 +12,8 @@ import numpy.typing as npt
 
 from legible_envs.drawing.canvas import Canvas, Image, Sprite, mix, paste, rgb, text_sprite
 from legible_envs.drawing.sheets import banner, check_tile
-from legible_envs.overcooked.layout import Cell, OvercookedLayout
+from legible_envs.overcooked.grid import Cell
+from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.overcooked.rendering.board import board_of
 from legible_envs.overcooked.rendering.palette import HEAT, PALETTE, PLAYER_COLOURS
 

@@ -15,7 +15,8 @@ import numpy.typing as npt
 from legible_envs.drawing.canvas import Canvas, Image, Sprite, paste, rgb, text_sprite
 from legible_envs.drawing.sheets import banner, check_tile
 from legible_envs.overcooked.game.view import GameView, PotView
-from legible_envs.overcooked.layout import FLOOR, OBSTACLE, STATION_CODES, Cell, OvercookedLayout
+from legible_envs.overcooked.grid import Cell
+from legible_envs.overcooked.layout import FLOOR, OBSTACLE, STATION_CODES, OvercookedLayout
 from legible_envs.overcooked.rendering.actors import chef_sprite, pot_sprite
 from legible_envs.overcooked.rendering.food import item_sprite
 from legible_envs.overcooked.rendering.hud import draw_hud, hud_height
@@ -41,7 +42,7 @@ def draw_layout(
     labels: Mapping[Cell, str] | None = None,
     title: str | None = None,
 ) -> Image:
-    """Draw a kitchen with nobody in it.
+    """Draw a kitchen without players.
 
     Args:
         layout: Any kitchen.

@@ -18,6 +18,7 @@ import numpy.typing as npt
 from legible_envs.errors import LayoutError
 from legible_envs.legibility import From, Node, PrefixScore, goal_legibility
 from legible_envs.observer import ObserverModel
+from legible_envs.overcooked.grid import NEIGHBOURS
 from legible_envs.overcooked.layout import FLOOR, OvercookedLayout
 from legible_envs.overcooked.recipes import soup_task
 from legible_envs.overcooked.scoring.boltzmann import (
@@ -30,8 +31,6 @@ from legible_envs.overcooked.scoring.boltzmann import (
 from legible_envs.tasks import TaskGraph
 
 __all__ = ["ambiguity", "explain_layout", "grid_graph", "layout_distance", "score_layout"]
-
-_NEIGHBOURS = ((-1, 0), (1, 0), (0, 1), (0, -1))
 
 
 def grid_graph(
@@ -48,7 +47,7 @@ def grid_graph(
 
     graph: dict[Node, dict[Node, float]] = {}
     for row, col in np.argwhere(layout.cells == 0).tolist():
-        around = [(row + dr, col + dc) for dr, dc in _NEIGHBOURS]
+        around = [(row + dr, col + dc) for dr, dc in NEIGHBOURS]
         graph[row, col] = {cell: cost(cell) for cell in around if layout.is_floor(cell)}
     for name in layout.stations:
         graph[name] = {}

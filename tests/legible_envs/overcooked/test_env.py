@@ -42,7 +42,7 @@ VARIANTS = [
     {},
     {"obs_type": "vector"},
     {"obs_type": "rgb"},
-    {"virtual_obstacles": "soft", "obstacle_cost": 1.0, "shaping": True},
+    {"virtual_obstacles": "soft", "crossing_cost": 1.0, "shaping": True},
     {"shape": (5, 6), "layouts": "random"},
     {"layouts": {"kind": "random", "split": "test", "num_layouts": 5}},
     {"layout": KITCHEN, "recipes": [["onion", "fish"]], "cook_time": 0},
@@ -354,7 +354,7 @@ def test_overcooked_ai_layouts_can_be_played():
     env = gym.make(NAME, shape=layout.shape, layout=layout, recipes=[["onion"] * 3] * 2)
     player = ScriptedPlayer(env, np.random.default_rng(0))
     obs, info = env.reset(seed=0)
-    assert env.unwrapped.valid_goal_names() == ("onion@(1,0)", "onion@(1,4)")
+    assert env.unwrapped.goals == ("onion@(1,0)", "onion@(1,4)")
     over = False
     while not over:
         obs, _, over, _, info = env.step(player(obs, info))
@@ -368,8 +368,8 @@ def test_unknown_options_and_arguments():
     for arguments in (
         {"obs_type": "smell"},
         {"virtual_obstacles": "firm"},
-        {"obstacle_cost": -1},
-        {"obstacle_cost": float("nan")},
+        {"crossing_cost": -1},
+        {"crossing_cost": float("nan")},
         {"shape": (2, 7)},
         {"shape": (7, 7, 7)},
         {"shaping": {"speed": 1}},
@@ -412,7 +412,33 @@ def test_an_episode_delivers_everything_once():
         assert not truncated
     assert total == 60.0
     assert sorted(env.unwrapped.view().delivered) == sorted(PAPER_SOUPS)
-    assert not info["valid_goals"].any()
+    assert not info["goal_mask"].any()
+    assert info["goals"] == ()
+    assert info["num_done"] == info["deliveries"] == 3
+
+
+def test_goals_are_named_as_they_are_marked():
+    rng = np.random.default_rng(0)
+    env = gym.make(NAME, layouts="random", cook_time=2)
+    player = ScriptedPlayer(env, rng)
+    obs, info = env.reset(seed=0)
+    for _ in range(600):
+        layout = env.unwrapped.view().layout
+        cells = [tuple(cell) for cell in np.argwhere(info["goal_mask"]).tolist()]
+        assert info["goals"] == tuple(layout.station_at(cell) or f"counter@({cell[0]},{cell[1]})" for cell in cells)
+        assert env.unwrapped.goals == info["goals"]
+        assert (info["goal_mask"].shape, info["goal_mask"].dtype) == (layout.shape, np.bool_)
+        action = player(obs, info) if rng.random() < 0.8 else int(rng.integers(6))
+        obs, _, over, _, info = env.step(action)
+        if over:
+            obs, info = env.reset()
+
+
+def test_infos_share_nothing():
+    env = gym.make(NAME)
+    infos = [env.reset(seed=0)[1], *(env.step(action)[4] for action in (0, 5, 1, 4))]
+    found = [value for info in infos for value in info.values() if isinstance(value, np.ndarray)]
+    assert not any(np.shares_memory(a, b) for i, a in enumerate(found) for b in found[:i])
 
 
 def test_truncation():
@@ -424,14 +450,14 @@ def test_truncation():
 
 def test_soft_obstacles_count_and_cost():
     layout = KITCHEN.replace("F 1   P", "F 1V  P")
-    env = gym.make(NAME, layout=layout, virtual_obstacles="soft", obstacle_cost=0.25)
+    env = gym.make(NAME, layout=layout, virtual_obstacles="soft", crossing_cost=0.25)
     env.reset()
     assert env.step(2)[1] == -0.25
     assert env.step(4)[1] == 0.0
     _, reward, _, _, info = env.step(0)
     assert reward == -0.25
     assert info["crossings"] == 2
-    hard = gym.make(NAME, layout=layout, obstacle_cost=0.25)
+    hard = gym.make(NAME, layout=layout, crossing_cost=0.25)
     hard.reset()
     assert hard.step(2)[1] == 0.0
     assert hard.unwrapped.view().players[0].cell == (3, 2)
@@ -457,10 +483,10 @@ def test_two_games_with_different_recipes_side_by_side():
     fish, onion = (gym.make(NAME, recipes=[[kind]], layout=KITCHEN) for kind in ("fish", "onion"))
     fish.reset(seed=0)
     onion.reset(seed=0)
-    assert fish.unwrapped.valid_goal_names() == ("fish",)
-    assert onion.unwrapped.valid_goal_names() == ("onion",)
+    assert fish.unwrapped.goals == ("fish",)
+    assert onion.unwrapped.goals == ("onion",)
     fish.step(1)
-    assert onion.unwrapped.valid_goal_names() == ("onion",)
+    assert onion.unwrapped.goals == ("onion",)
 
 
 def test_grid_shows_what_the_view_says():

@@ -26,10 +26,10 @@ from legible_envs.overcooked.humans import (
     rationality_spread,
     simulate_participants,
 )
+from legible_envs.overcooked.policies import WalkingPlayer
 from legible_envs.overcooked.scoring.boltzmann import boltzmann_legibility, boltzmann_trajectories
 from legible_envs.overcooked.scoring.explanation import grid_graph
-from legible_envs.overcooked.trajectories import record_episode
-from legible_envs.rollouts import Trajectory
+from legible_envs.rollouts import Trajectory, record_episode
 from legible_envs.tasks import Subtask, TaskGraph
 from predictors import BayesianGoalPredictor
 from tests.legible_envs.overcooked.kitchens import random_kitchen, steps_between
@@ -320,10 +320,12 @@ def test_random_sequences_are_uniform():
         assert visits[stage.start, stage.goals] / 400 == pytest.approx(stage.weight, abs=error)
 
 
-@pytest.mark.parametrize("walker", ["boltzmann", "planner"])
-def test_participants_do_the_whole_task(walker):
+@pytest.mark.parametrize("population", ["boltzmann", "planner"])
+def test_participants_do_the_whole_task(population):
     layout = random_kitchen(np.random.default_rng(5), (7, 7))
-    walks = simulate_participants(layout, 4, np.random.default_rng(0), walker=walker, executions=2, layout_name="k")
+    walks = simulate_participants(
+        layout, 4, np.random.default_rng(0), population=population, executions=2, layout_name="k"
+    )
     assert len(walks) == 4 * 2 * 12
     for number in range(4):
         mine = [walk for walk in walks if walk.participant == f"person/{number}"]
@@ -363,8 +365,8 @@ def test_impossible_tasks():
         BoltzmannWalker().walk(OPEN, "pot", "fish", rng)
     with pytest.raises(LayoutError, match="no floor"):
         BoltzmannWalker().walk(OPEN, (0, 0), "onion", rng)
-    with pytest.raises(ValueError, match="walker must be"):
-        simulate_participants(OPEN, 1, rng, walker="ghost")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="`population` must be"):
+        simulate_participants(OPEN, 1, rng, population="ghost")  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -391,12 +393,12 @@ def test_bad_people(make, message):
 # -- nothing leaks -----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("walker", ["boltzmann", "planner"])
-def test_one_cell_says_no_more_than_the_prior(walker):
+@pytest.mark.parametrize("population", ["boltzmann", "planner"])
+def test_one_cell_says_no_more_than_the_prior(population):
     rng = np.random.default_rng(0)
     for _ in range(3):
         layout = random_kitchen(rng, (6, 6))
-        walks = simulate_participants(layout, 20, rng, walker=walker)
+        walks = simulate_participants(layout, 20, rng, population=population)
         predictor = BayesianGoalPredictor().fit(walks)
         for length in (0, 1):
             probabilities = predictor.predict_proba([walk.first(length) for walk in walks])
@@ -431,7 +433,7 @@ def test_kernels_run_as_plain_python():
         "from legible_envs.overcooked.humans import fit_rationality, simulate_participants\n"
         "ws = OvercookedWorkspace((5, 5), human='boltzmann', rationality=1.1)\n"
         "genome = ws.sample(1, np.random.default_rng(0))[0]\n"
-        "people = [simulate_participants(ws.decode(genome), 1, np.random.default_rng(0), walker=name)\n"
+        "people = [simulate_participants(ws.decode(genome), 1, np.random.default_rng(0), population=name)\n"
         "          for name in ('boltzmann', 'planner')]\n"
         "print(ws.legibility(genome), *[walk.states.sum() for walks in people for walk in walks])\n"
         "print(*[round(float(walk.times[-1]), 6) for walks in people for walk in walks])\n"
@@ -448,7 +450,7 @@ def test_players_finish_any_valid_kitchen():
         for _ in range(5):
             layout = random_kitchen(rng, (6, 6))
             env = gym.make("LegibleOvercooked-v0", shape=(6, 6), layout=layout, max_episode_steps=20_000)
-            player = walker.policy(env, rng)
+            player = WalkingPlayer(env, walker, rng)
             obs, info = env.reset(seed=0)
             over = False
             while not over:
@@ -462,7 +464,7 @@ def test_players_keep_off_soft_obstacles():
     crossings = {}
     for kind in ("hard", "soft"):
         env = gym.make("LegibleOvercooked-v0", layout=layout, shape=(5, 7), virtual_obstacles=kind)
-        player = BoltzmannWalker(1.5, idle=0.0).policy(env.unwrapped, np.random.default_rng(0))
+        player = WalkingPlayer(env.unwrapped, BoltzmannWalker(1.5, idle=0.0), np.random.default_rng(0))
         obs, info = env.reset(seed=0)
         for _ in range(300):
             obs, _, terminated, _, info = env.step(player(obs, info))
@@ -475,7 +477,7 @@ def test_players_keep_off_soft_obstacles():
 
 def test_players_in_vector_environments():
     envs = gym.make_vec("LegibleOvercooked-v0", num_envs=3, vectorization_mode="vector_entry_point", shape=(5, 5))
-    player = BoltzmannWalker(2.0).policy(envs, np.random.default_rng(0))
+    player = WalkingPlayer(envs, BoltzmannWalker(2.0), np.random.default_rng(0))
     obs, info = envs.reset(seed=0)
     total = 0.0
     for _ in range(800):
@@ -494,7 +496,7 @@ def test_play_is_the_walker_that_was_asked_for():
     walker = BoltzmannWalker(1.3, idle=0.4, turn=0.05)
     walks = []
     for number in range(25):
-        walks += record_episode(env, walker.policy(env, rng), seed=number, participant=str(number))
+        walks += record_episode(env, WalkingPlayer(env, walker, rng), seed=number, participant=str(number))
     fit = fit_rationality(walks, confidence=0.999)
     assert fit.interval[0] < 1.3 < fit.interval[1]
     ticks = np.concatenate([np.diff(walk.times[:-1]) / 0.15 for walk in walks])

@@ -84,7 +84,7 @@ def test_stages_are_those_of_the_task_with_one_pot(recipes, undecided):
         obs, info = env.reset()
         place, over = "serving", False
         while not over:
-            view, names = env.unwrapped.view(), env.unwrapped.valid_goal_names()
+            view, names = env.unwrapped.view(), env.unwrapped.goals
             held = view.players[0].held
             action = player(obs, info)
             obs, _, over, _, info = env.step(action)

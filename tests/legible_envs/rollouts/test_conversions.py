@@ -16,15 +16,15 @@ from legible_envs.errors import LayoutError
 from legible_envs.overcooked.human_play import Played
 from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.overcooked.policies import ScriptedPlayer
-from legible_envs.overcooked.trajectories import record_episode
+from legible_envs.overcooked.trajectories import trajectories_from_played, trajectories_from_views
 from legible_envs.rollouts import (
-    RecordRollouts,
+    RecordTrajectories,
     Trajectory,
     read_any,
     read_csv,
+    record_episode,
     save_trajectories,
     to_minari,
-    trajectories_from_played,
     write_csv,
 )
 from legible_envs.tabletop import TableObject, TabletopLayout, VirtualObstacle
@@ -136,8 +136,8 @@ def test_what_csv_cannot_hold_is_refused_and_the_old_file_stays(tmp_path: Path) 
 # -- episodes ---------------------------------------------------------------------------------------------------------
 
 
-def scripted(episodes: int = 2, steps: int = 10_000) -> RecordRollouts:
-    env = RecordRollouts(gym.make("LegibleOvercooked-v0", shape=(5, 6)))
+def scripted(episodes: int = 2, steps: int = 10_000, **labels: Any) -> RecordTrajectories:
+    env = RecordTrajectories(gym.make("LegibleOvercooked-v0", shape=(5, 6)), **labels)
     player = ScriptedPlayer(env, np.random.default_rng(0))
     for seed in range(episodes):
         observation, info = env.reset(seed=seed)
@@ -149,23 +149,27 @@ def scripted(episodes: int = 2, steps: int = 10_000) -> RecordRollouts:
 
 
 def test_a_recording_holds_the_walks_of_its_episodes() -> None:
-    env = scripted()
+    env = scripted(participant="s")
     assert len(env.episodes) == 2
     plain = gym.make("LegibleOvercooked-v0", shape=(5, 6))
     player = ScriptedPlayer(plain, np.random.default_rng(0))
     expected = [walk for seed in range(2) for walk in record_episode(plain, player, seed=seed, participant="s")]
     assert len(expected) > 10
-    assert env.trajectories(participant="s") == expected
-    assert {walk.candidate_set for walk in env.trajectories(candidate_set="all")} == {"all"}
+    assert env.trajectories() == expected
+    everything = scripted(candidate_set="all")
+    assert {walk.candidate_set for walk in everything.trajectories()} == {"all"}
+    assert everything.env.unwrapped.trajectories(candidate_set="all") == everything.trajectories()[-12:]  # type: ignore[attr-defined]
+    env.participant = "t"
+    assert [walk.participant for walk in env.trajectories()] == ["s"] * 12 + ["t"] * 12
     with pytest.raises(LayoutError, match="CartPole"):
-        RecordRollouts(gym.make("CartPole-v1"))
+        RecordTrajectories(gym.make("CartPole-v1"))
 
 
 def test_gymnasiums_own_play_can_be_recorded(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     from gymnasium.utils.play import PlayableGame, play
 
-    env = RecordRollouts(
+    env = RecordTrajectories(
         gym.make(
             "LegibleOvercooked-v0", shape=(5, 5), layout=KITCHEN, recipes=[("onion",) * 3], render_mode="rgb_array"
         )
@@ -186,8 +190,8 @@ def test_gymnasiums_own_play_can_be_recorded(monkeypatch: pytest.MonkeyPatch) ->
     assert env.episodes[0].actions == [0, 2, 0, 0, 5]
 
 
-def as_played(env: RecordRollouts) -> Played:
-    layout = env.episodes[0].views[0].layout
+def as_played(env: RecordTrajectories) -> Played:
+    layout = OvercookedLayout.from_ascii(env.episodes[0].options["layout"])
     from legible_envs.overcooked.recipes import PAPER_SOUPS
 
     counts = [len(episode) for episode in env.episodes]
@@ -201,13 +205,13 @@ def as_played(env: RecordRollouts) -> Played:
 
 
 def test_recordings_of_play_become_the_walks_that_were_played(tmp_path: Path) -> None:
-    env = scripted(episodes=1)
+    env = scripted(episodes=1, participant="me", condition="home")
     played = as_played(env)
     found = trajectories_from_played(played, participant="me", condition="home")
-    assert found == env.trajectories(participant="me", condition="home")
+    assert found == env.trajectories()
     assert len(found) == 12
     played.save(tmp_path / "me.npz")
-    assert read_any(tmp_path / "me.npz") == env.trajectories(participant="me")
+    assert read_any(tmp_path / "me.npz") == trajectories_from_played(played, participant="me")
     save_trajectories(tmp_path / "walks.npz", found)
     assert read_any(tmp_path / "walks.npz") == found
     wrong = Played(played.layout, played.recipes, actions=played.actions, episodes=played.episodes,
@@ -240,4 +244,47 @@ def test_a_minari_data_set_is_read_back(tmp_path: Path, monkeypatch: pytest.Monk
     with pytest.raises(ValueError, match="already"):
         to_minari(env, "kitchen/scripted-v0")
     with pytest.raises(ValueError, match="nothing was recorded"):
-        to_minari(RecordRollouts(gym.make("LegibleOvercooked-v0")), "kitchen/empty-v0")
+        to_minari(RecordTrajectories(gym.make("LegibleOvercooked-v0")), "kitchen/empty-v0")
+
+
+def test_reaches_become_a_minari_data_set(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    minari = pytest.importorskip("minari")
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    env = RecordTrajectories(gym.make("LegibleTabletop-v0", max_episode_steps=5), participant="p")
+    env.action_space.seed(0)
+    for seed in range(2):
+        env.reset(seed=seed, options={"start": "red-circle"})
+        while not (env.episodes and (seed + 1 == len(env.episodes)) and env.episodes[-1].truncations[-1]):
+            env.step(env.action_space.sample())
+    to_minari(env, "table/random-v0")
+    loaded = minari.load_dataset("table/random-v0")
+    assert (loaded.total_episodes, loaded.total_steps) == (2, 10)
+    for theirs, ours in zip(loaded.iterate_episodes(), env.episodes, strict=True):
+        np.testing.assert_array_equal(theirs.observations, np.stack(ours.observations))
+        np.testing.assert_array_equal(theirs.actions, np.stack(ours.actions))
+    again = env.unwrapped.settings.read(env.episodes[0].options["layout"])  # type: ignore[attr-defined]
+    assert again == env.unwrapped.layout  # type: ignore[attr-defined]
+    assert env.episodes[0].options["start"] == "red-circle"
+
+
+def test_the_trajectories_of_an_episode_are_those_of_its_views() -> None:
+    """They are played again from the actions; the views are what was seen of every state."""
+    env = gym.make("LegibleOvercooked-v0", layouts="random", shape=(6, 6), virtual_obstacles="soft")
+    game: Any = env.unwrapped
+    assert game.trajectories() == []
+    rng = np.random.default_rng(0)
+    for seed in range(5):
+        player = ScriptedPlayer(env, rng)
+        observation, info = env.reset(seed=seed)
+        views, goals = [game.view()], [info["goals"]]
+        for _ in range(250):
+            action = player(observation, info) if rng.random() < 0.9 else int(rng.integers(6))
+            observation, _, over, _, info = env.step(action)
+            views.append(game.view())
+            goals.append(info["goals"])
+            if over:
+                break
+        for kind, options in (("game", {"valid_goals": goals}), ("all", {})):
+            expected = trajectories_from_views(views, participant="p", min_candidates=2, **options)
+            assert game.trajectories(participant="p", candidate_set=kind, min_candidates=2) == expected
+            assert expected

@@ -20,13 +20,13 @@ from legible_envs.overcooked.policies import ScriptedPlayer
 from legible_envs.overcooked.trajectories import (
     dispensers_in_reach,
     find_walks,
-    record_episode,
     trajectories_from_views,
 )
 from legible_envs.rollouts import (
     CUTS,
     Trajectory,
     load_trajectories,
+    record_episode,
     save_trajectories,
     trajectories_from_rollout,
 )

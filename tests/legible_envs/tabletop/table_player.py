@@ -67,7 +67,7 @@ class Player:
         game = env.unwrapped
         if game.carry_to is not None:
             return towards(env, game.carry_to)
-        goals = game.valid_goal_names()
+        goals = game.goals
         if self.goal not in goals:
             self.goal = str(self.rng.choice(goals)) if goals else None
         if self.goal is None:

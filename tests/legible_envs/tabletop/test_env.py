@@ -141,7 +141,7 @@ def test_vectors_stack_what_is_valid(mode):
             for mask, names in zip(info["goal_mask"], info["goals"], strict=True):
                 assert {name for name, valid in zip(TASK.layout.goals, mask, strict=True) if valid} == set(names)
             assert info["num_done"].tolist() == [0, 0]
-            assert envs.call("valid_goal_names") == tuple(info["goals"])
+            assert envs.call("goals") == tuple(info["goals"])
             _, _, _, _, info = envs.step(envs.action_space.sample() * 0)
     finally:
         envs.close()
@@ -218,7 +218,7 @@ def test_nothing_is_valid_while_something_is_carried():
     env.reset()
     go_to(env, TASK.layout.place(FIRST[0]), near=0.02)
     assert env.unwrapped.holding == FIRST[0]
-    assert env.unwrapped.valid_goal_names() == ()
+    assert env.unwrapped.goals == ()
     assert env.unwrapped.carry_to.tolist() == list(TASK.configuration[FIRST[0]])
     before = env.unwrapped.hand
     _, _, _, _, info = env.step(np.array([0.1, 0.1]))

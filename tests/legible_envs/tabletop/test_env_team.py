@@ -11,7 +11,7 @@ import pytest
 import legible_envs  # noqa: F401
 from legible_envs.errors import LayoutError
 from legible_envs.rollouts import load_trajectories, save_trajectories
-from legible_envs.rollouts.recording import RecordReaches
+from legible_envs.rollouts.recording import RecordTrajectories
 from legible_envs.tabletop.partner.belief import GoalBelief
 from tests.legible_envs.tabletop.table_envs import APART, FIRST, SECOND, TASK, WALL, make
 from tests.legible_envs.tabletop.table_player import (
@@ -93,7 +93,7 @@ def test_who_takes_an_object_first_has_it():
     for _ in range(10):
         info = slow.step(np.zeros(2))[4]
     assert info["holding"] == FIRST[2]
-    assert FIRST[2] not in slow.unwrapped.valid_goal_names()
+    assert FIRST[2] not in slow.unwrapped.goals
     assert slow.unwrapped.view().robot_holding is None
 
 
@@ -213,7 +213,7 @@ def test_reaches_become_trajectories():
 
 
 def test_reaches_of_many_episodes_are_kept(tmp_path):
-    env = RecordReaches(make(partner="robot"), participant="p2", condition="robot")
+    env = RecordTrajectories(make(partner="robot"), participant="p2", condition="robot")
     counts = [len(env.trajectories())]
     for seed in range(2):
         info = play(env, seed)[-1][4]
@@ -229,7 +229,7 @@ def test_reaches_of_many_episodes_are_kept(tmp_path):
     path = save_trajectories(tmp_path / "reaches.npz", env.trajectories())
     assert load_trajectories(path) == env.trajectories()
     with pytest.raises(LayoutError, match="LegibleTabletop"):
-        RecordReaches(gym.make("LegibleOvercooked-v0"))
+        RecordTrajectories(gym.make("CartPole-v1"))
 
 
 def test_playing_on_after_the_end_changes_nothing():
