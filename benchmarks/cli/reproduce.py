@@ -1,4 +1,4 @@
-"""``legible reproduce``: the paper's experiments, and those it could not make."""
+"""``legible reproduce``: the paper's experiments, and others that need simulated people."""
 
 from __future__ import annotations
 
@@ -40,14 +40,14 @@ _PEOPLE = "People are simulated or recorded here, not the paper's participants."
 EXPERIMENTS: Final = {
     "overcooked": Experiment(
         {".": "benchmarks.experiments.overcooked", "recorded": "benchmarks.experiments.recorded"},
-        "Are legible kitchens read better?",
-        "Random, efficient, legible-efficient and legible kitchens, and who can tell early what a cook reaches for. "
+        "Are goals predicted better in legible kitchens?",
+        "Random, efficient, legible-efficient and legible kitchens, and how early predictors tell a cook's goal. "
         f"{_PEOPLE}",
     ),
     "tabletop": Experiment(
         {".": "benchmarks.experiments.tabletop"},
-        "Are legible tables read better, and does a robot profit?",
-        "Sorted cubes, better places, virtual obstacles, and both; read by predictors, then shared with a robot. "
+        "Are goals predicted better at legible tables, and does a robot profit?",
+        "Sorted cubes, better places, virtual obstacles, and both: goals predicted, then a robot at the same table. "
         f"{_PEOPLE}",
     ),
     "optimizers": Experiment(
@@ -68,7 +68,7 @@ def run_experiment(
     scheduler: str | None = None,
     progress: Callable[[Event], object] | None = None,
 ) -> Path:
-    """Run what has not been run yet, analyse all of it, and write the report.
+    """Run the trials that are missing, analyse all of them, and write the report.
 
     Args:
         name: One of :data:`EXPERIMENTS`.
@@ -94,7 +94,7 @@ def run_experiment(
 
 
 def _run_part(module: str, folder: Path, how: Mapping[str, Any]) -> list[Section]:
-    """Run one part and read its sections; what needs recordings that are not there says so in the report."""
+    """Run one part and read its sections; a part that lacks its recordings says so in the report."""
     from benchmarks.reports.experiment_report import Section
     from legible_envs.datasets.overcooked_2019 import RecordingsError
 
@@ -122,9 +122,9 @@ def reproduce(
     scheduler: str | None,
     quiet: bool,
 ) -> None:
-    """Run an experiment of the paper, and what the paper could not.
+    """Run an experiment of the paper again.
 
-    Writes result files, tables, figures and report.html. Interrupted, it goes on where it stopped.
+    Writes result files, tables, figures and report.html. After an interruption the same command continues.
     """
     from benchmarks.trials import CellsFailed
     from benchmarks.trials.progress import CellsProgress
@@ -142,7 +142,7 @@ def reproduce(
                 progress=progress,
             )
     except KeyboardInterrupt:
-        click.echo(f"stopped; finished cells are kept in {folder}, the same command goes on from there", err=True)
+        click.echo(f"stopped; finished trials are kept in {folder}; the same command continues from there", err=True)
         raise click.exceptions.Exit(130) from None
     except CellsFailed as error:
         raise click.ClickException(str(error)) from error
@@ -151,7 +151,7 @@ def reproduce(
 
 
 def _tell(folder: Path) -> None:
-    """What was written."""
+    """Print the files written."""
     for kind in ("tables", "figures"):
         found = sorted(path.name for path in (folder / kind).glob("*") if path.is_file())
         if found:

@@ -248,7 +248,7 @@ def test_traceback_on_request(tmp_path: Path) -> None:
     assert isinstance(result.exception, FileNotFoundError)
 
 
-def test_score_reads_recorded_walks_of_the_kitchen(tmp_path: Path) -> None:
+def test_score_predicts_recorded_trajectories_of_the_kitchen(tmp_path: Path) -> None:
     from legible_envs.overcooked import OvercookedLayout
     from legible_envs.rollouts import Trajectory, save_trajectories
     from predictors import BayesianGoalPredictor
@@ -260,7 +260,7 @@ def test_score_reads_recorded_walks_of_the_kitchen(tmp_path: Path) -> None:
     save_trajectories(tmp_path / "walks.npz", [walk, away, walk])
     result = legible("score", "-", "--trajectories", tmp_path / "walks.npz", text=KITCHEN)
     assert result.exit_code == 0, result.output
-    assert "2 walks" in result.output
+    assert "2 trajectories" in result.output
     expected = BayesianGoalPredictor().fit([walk]).score([walk], fractions=(0.5,))
     row = next(line for line in result.output.splitlines() if line.strip().startswith("Eq. 1")).split()
     assert float(row[4]) == pytest.approx(expected, abs=1e-3)
@@ -287,7 +287,7 @@ def walks_of_run(run: Path, tmp_path: Path) -> Path:
     return write_csv(tmp_path / "walks.csv", walks)
 
 
-def test_score_judges_predictors_and_reports_them(run: Path, walks_of_run: Path) -> None:
+def test_score_evaluates_predictors_and_reports_them(run: Path, walks_of_run: Path) -> None:
     import json
 
     import pandas as pd
