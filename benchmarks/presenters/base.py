@@ -16,7 +16,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 import numpy as np
@@ -109,23 +109,31 @@ class Design:
     """One layout named on the command line.
 
     Attributes:
-        noun: What a layout is called.
-        picture: What its picture shows, in a few words; empty where there is no picture.
         layout: The layout.
         workspace: The design problem it belongs to, or None where it breaks the design rules.
         genome: ``(d,)`` the layout in that workspace, or None.
         broken_rule: Why it has no genome, in a sentence.
         settings: Settings of the score that were asked for.
+        presenter: The presenter that prints and draws it, unless a subclass does.
     """
-
-    noun: ClassVar[str] = "layout"
-    picture: ClassVar[str] = ""
 
     layout: Any
     workspace: Any
     genome: npt.NDArray[Any] | None
     broken_rule: str = ""
     settings: dict[str, Any] = field(default_factory=dict)
+    presenter: Presenter | None = field(default=None, kw_only=True)
+
+    @property
+    def noun(self) -> str:
+        """What a layout is called."""
+        return "layout" if self.presenter is None else self.presenter.noun
+
+    @property
+    def picture(self) -> str:
+        """What its picture shows, in a few words; empty where there is no picture."""
+        draws = self.presenter is not None and type(self.presenter).draw is not Presenter.draw
+        return f"the {self.noun}" if draws else ""
 
     def summary(self) -> dict[str, Any]:
         """Score, distance and what belongs beside them."""
@@ -155,13 +163,11 @@ class Design:
 
     def text(self, console: Console) -> RenderableType:
         """The layout for a terminal."""
-        from rich.text import Text
-
-        return Text(text_of(self.layout))
+        return (self.presenter or Presenter()).text(console, self.layout)
 
     def draw(self) -> Image | None:
-        """The layout with an observer's confusion, as ``legible show --out`` writes it; None where nothing is drawn."""
-        return None
+        """The layout as ``legible show --out`` writes it, best with an observer's confusion; None without a picture."""
+        return None if self.presenter is None else self.presenter.draw(self.layout, self.workspace)
 
     def write_picture(self, path: Path | None) -> tuple[str, Path] | None:
         """Write the picture of ``legible show``: what it shows, and where it is; None without a path.
@@ -252,12 +258,13 @@ class Presenter:
         layout: Any = text.strip("\r\n")
         if workspace.name in list_layout_kinds():
             layout = kind_named(workspace.name).from_text(text)
-        return Design(layout, workspace, np.asarray(workspace.encode(layout)), "", dict(asked))
+        return Design(layout, workspace, np.asarray(workspace.encode(layout)), "", dict(asked), presenter=self)
 
     def design_of_run(self, run: Run, asked: Mapping[str, Any]) -> Design:
         """The best layout of a run; ``asked`` are settings of the score given on the command line."""
         workspace = make_workspace({**run.config["workspace"], **asked}) if asked else run.workspace
-        return Design(run.workspace.decode(run.best_genome), workspace, run.best_genome, "", dict(asked))
+        genome = run.best_genome
+        return Design(run.workspace.decode(genome), workspace, genome, "", dict(asked), presenter=self)
 
     def design(self, settings: Mapping[str, Any]) -> dict[str, Any]:
         """Settings of the workspace from options of the command line; options that are absent say nothing.
