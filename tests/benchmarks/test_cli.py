@@ -9,11 +9,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import click
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
-from benchmarks.cli.app import main
+from benchmarks.cli.app import CONTENTS, main
 from benchmarks.presenters.overcooked import load_kitchen
 from legible_envs import __version__
 from legible_envs.overcooked import OvercookedLayout, OvercookedWorkspace
@@ -387,12 +388,22 @@ def test_trajectories_of_another_kitchen_are_refused(tmp_path: Path) -> None:
 # -- the command itself ------------------------------------------------------------------------------------------------
 
 
-def test_help_names_every_command() -> None:
+def test_help_is_a_table_of_contents_of_every_command() -> None:
     result = legible("--help")
     assert result.exit_code == 0
-    for command in ("optimize", "score", "show", "play", "humans", "bench", "emitters", "demo", "report"):
-        assert command in result.output
-        assert legible(command, "--help").exit_code == 0
+    lines = result.output.splitlines()
+    named = [name for names in CONTENTS.values() for name in names]
+    assert {name.split()[0] for name in named} == set(main.commands)
+    humans = main.commands["humans"]
+    assert isinstance(humans, click.Group)
+    assert {name.split()[1] for name in named if " " in name} == set(humans.commands)
+    for title, names in CONTENTS.items():
+        start = lines.index(f"{title}:")
+        for row, name in zip(lines[start + 1 :], names, strict=False):
+            assert row.strip().startswith(name)
+            assert row.rstrip().endswith("."), "one line each"
+    for name in named:
+        assert legible(*name.split(), "--help").exit_code == 0
 
 
 def test_version() -> None:

@@ -12,18 +12,10 @@ import pytest
 from rich.console import Console
 
 from benchmarks.cli.demo import RANDOM_LAYOUTS, make_panels, recorded_play, run_demo
-from legible_envs.datasets.overcooked_2019 import RecordingsError, load_recorded_games
+from legible_envs.datasets.overcooked_2019 import RecordingsError
 from legible_envs.overcooked import OvercookedLayout, OvercookedWorkspace
 
 TINY = {"shape": (5, 5), "evaluations": 3000, "efficient_evaluations": 2000}
-
-
-def have_recordings() -> bool:
-    try:
-        load_recorded_games(layouts=())
-    except RecordingsError:
-        return False
-    return True
 
 
 def run_it(folder: Path, **settings: object) -> str:
@@ -104,7 +96,6 @@ def test_no_network_is_one_line_not_an_error(monkeypatch: pytest.MonkeyPatch, tm
 
 
 @pytest.mark.data
-@pytest.mark.skipif(not have_recordings(), reason="the recorded games are not here: legible humans fetch")
 def test_recorded_play_agrees_with_every_walk_scored_by_itself() -> None:
     from benchmarks.experiments.prediction.run import score_every_walk
     from benchmarks.experiments.prediction.sweep import UNTRAINED

@@ -14,7 +14,7 @@ from PIL import Image
 
 from benchmarks.cli.app import main
 from legible_envs.rollouts import Trajectory, load_trajectories, read_csv, save_trajectories, write_csv
-from legible_envs.workspace import check_workspace, list_workspaces, make_workspace
+from legible_envs.workspace import make_workspace
 
 SHELF = "tests.support.shelf_workspace:ShelfWorkspace"
 
@@ -41,13 +41,11 @@ def aisle(aisle_package: Path, tmp_path: Path) -> Path:
     return out
 
 
-def test_the_package_is_listed_and_keeps_the_contract(aisle_package: Path) -> None:
-    assert list_workspaces()["aisle"].origin == "entry point of legible-workspace-example 0.1.0"
+@pytest.mark.usefixtures("aisle_package")
+def test_the_package_is_listed() -> None:
     result = legible("workspaces")
     assert "aisle" in result.output
     assert "overcooked" in result.output
-    check_workspace(make_workspace("aisle"))
-    check_workspace(make_workspace("aisle", heavy=True))
 
 
 def test_a_search_of_the_package_is_shown_scored_and_reported(aisle: Path, tmp_path: Path) -> None:

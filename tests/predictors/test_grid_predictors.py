@@ -15,7 +15,7 @@ from sklearn.base import clone
 
 from benchmarks.experiments.prediction import PREDICTORS, compare_with_reference, score_recorded_play
 from benchmarks.experiments.prediction.sweep import LAYOUTS, REFERENCE
-from legible_envs.datasets.overcooked_2019 import RecordingsError, recorded_trajectories
+from legible_envs.datasets.overcooked_2019 import recorded_trajectories
 from legible_envs.errors import LayoutError
 from legible_envs.overcooked import OvercookedLayout
 from legible_envs.rollouts import Trajectory
@@ -383,18 +383,7 @@ def test_bad_parameters_are_refused() -> None:
 # -- recorded people --------------------------------------------------------------------------------------------------
 
 
-def have_recordings() -> bool:
-    try:
-        return bool(recorded_trajectories(None, ["cramped_room"]))
-    except RecordingsError:
-        return False
-
-
-needs_recordings = pytest.mark.skipif(not have_recordings(), reason="no recorded games: legible humans fetch")
-
-
 @pytest.mark.data
-@needs_recordings
 def test_beliefs_about_recorded_people_are_honest_before_they_move() -> None:
     walks = recorded_trajectories(None, ["cramped_room"])[:120]
     counts = Counter(w.goal for w in walks)
@@ -407,7 +396,6 @@ def test_beliefs_about_recorded_people_are_honest_before_they_move() -> None:
 
 @pytest.mark.data
 @pytest.mark.slow
-@needs_recordings
 def test_recorded_people_are_read_as_well_as_measured_before() -> None:
     table = compare_with_reference(score_recorded_play())
     assert len(table) == len(LAYOUTS) * len(PREDICTORS)

@@ -18,7 +18,6 @@ import predictors.registry as registry
 from benchmarks.experiments.prediction import UNTRAINED, accuracy_table, score_recorded_play
 from benchmarks.experiments.prediction.run import score_every_walk
 from benchmarks.experiments.prediction.sweep import LAYOUTS
-from legible_envs.datasets.overcooked_2019 import RecordingsError, load_recorded_games
 from legible_envs.errors import LayoutError
 from legible_envs.legibility import optimal_costs, posterior
 from legible_envs.overcooked import OvercookedLayout
@@ -410,16 +409,7 @@ def test_importing_the_package_is_cheap() -> None:
 # -- recorded people -------------------------------------------------------------------------------------------------
 
 
-@pytest.fixture(scope="module")
-def recorded() -> None:
-    try:
-        load_recorded_games(layouts=())
-    except RecordingsError as error:
-        pytest.skip(str(error))
-
-
 @pytest.mark.data
-@pytest.mark.usefixtures("recorded")
 def test_recorded_people_are_read_as_well_as_measured_before() -> None:
     scores = score_recorded_play(predictors=UNTRAINED, repeats=1)
     table = accuracy_table(scores).set_index(["layout", "predictor"])
@@ -441,7 +431,6 @@ def test_recorded_people_are_read_as_well_as_measured_before() -> None:
 
 
 @pytest.mark.data
-@pytest.mark.usefixtures("recorded")
 def test_candidates_of_the_running_game_are_judged_apart() -> None:
     rows = score_every_walk(layouts=("cramped_room",), fractions=(0.5,), candidate_set="game", repeats=1)
     assert rows.attrs["candidate_set"] == "game"
