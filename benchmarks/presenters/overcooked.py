@@ -9,7 +9,7 @@ import click
 import numpy as np
 import numpy.typing as npt
 
-from benchmarks.console import board_for, number
+from benchmarks.console import kitchen_text, number
 from benchmarks.presenters.base import WANTED, Design, Panel, Presenter, ReportTexts, as_genome, refuse, template
 from benchmarks.presenters.registry import load_design
 from benchmarks.runs import Run
@@ -87,7 +87,7 @@ class Kitchen(Design):
 
     def text(self, console: Console) -> RenderableType:
         """The kitchen in the characters that this console can show."""
-        return board_for(console, self.layout)
+        return kitchen_text(console, self.layout)
 
     def draw(self) -> Image:
         """The kitchen with, on each cell, how often an observer would name a wrong goal."""
@@ -188,7 +188,7 @@ class KitchenPresenter(Presenter):
 
     def text(self, console: Console, layout: OvercookedLayout) -> RenderableType:
         """The kitchen in colour."""
-        return board_for(console, layout)
+        return kitchen_text(console, layout)
 
     def draw(self, layout: OvercookedLayout, workspace: Any, *, tile: int = 64) -> Image:
         """The kitchen without players."""
@@ -243,7 +243,7 @@ def panels_text(console: Console, panels: Sequence[Panel]) -> Table:
     grid = Table.grid(padding=(0, 4))
     for _ in panels:
         grid.add_column(max_width=32)
-    grid.add_row(*(board_for(console, p.layout) for p in panels))
+    grid.add_row(*(kitchen_text(console, p.layout) for p in panels))
     grid.add_row()
     grid.add_row(*(Text(p.name, style="bold") for p in panels))
     grid.add_row(*(f"legibility [bold cyan]{number(p.score)}[/]" for p in panels))

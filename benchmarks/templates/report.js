@@ -60,6 +60,7 @@
 
   function drawMap() {
     picture = svg("svg", { viewBox: `0 0 ${size.width} ${size.height}`, "aria-hidden": "true" });
+    picture.style.maxWidth = `${1.6 * size.width}px`; // labels of small archives stay labels
     const inset = Math.min(1, cellWidth / 12);
     const paint = (cell, attributes) => svg("rect", { x: cell.x + inset, y: cell.y + inset, width: cellWidth - 2 * inset, height: cellHeight - 2 * inset, rx: 2, ...attributes });
     for (let row = 0; row < rowAxis.count; row++) {

@@ -17,5 +17,5 @@ function makePlace(data, { svg }) {
     }));
     return picture;
   }
-  return { board, asText: (layout) => layout, inWords: (label) => String(label) };
+  return { board, asText: (layout) => layout, inWords: (label) => `${data.axes[1].name}: ${label}` };
 }
