@@ -1,4 +1,4 @@
-"""What the command line prints: kitchens and tabletops in colour, several side by side, and tables of numbers."""
+"""What the command line prints: kitchens and tables in colour, and rows of numbers."""
 
 from __future__ import annotations
 
@@ -13,27 +13,22 @@ if TYPE_CHECKING:
     from legible_envs.overcooked.layout import OvercookedLayout
     from legible_envs.tabletop import TabletopLayout
 
-__all__ = ["board", "board_for", "number", "say", "table", "table_text"]
+__all__ = ["kitchen_text", "number", "say", "table", "table_text"]
 
 _PLAIN = {"X": "##", "V": "[]", " ": "  "}
 _FANCY = {"X": "▒▒", "V": "[]", " ": "  "}
 
 
 def say() -> Console:
-    """The console that commands print to: standard output, wide enough for boards when it is not a terminal."""
+    """The console that commands print to: standard output, wide enough for panels when it is not a terminal."""
     from rich.console import Console
 
     console = Console(highlight=False, soft_wrap=False)
     return console if console.is_terminal else Console(highlight=False, width=120)
 
 
-def board(layout: OvercookedLayout, *, fancy: bool = True) -> Text:
-    """A kitchen in the colours of its drawings; legible without colour too.
-
-    Args:
-        layout: The kitchen.
-        fancy: Whether the terminal can show block characters.
-    """
+def kitchen_text(console: Console, layout: OvercookedLayout) -> Text:
+    """A kitchen in the colours of its drawings and the characters that this console can show."""
     from rich.text import Text
 
     from legible_envs.overcooked.layout import STATION_TYPES, SYMBOLS
@@ -46,7 +41,7 @@ def board(layout: OvercookedLayout, *, fancy: bool = True) -> Text:
     }
     for number, kind in enumerate(STATION_TYPES):
         styles[SYMBOLS[3 + number]] = f"bold {_ink(PALETTE[kind])} on {PALETTE[kind]}"
-    glyphs = _FANCY if fancy else _PLAIN
+    glyphs = _FANCY if console.encoding.lower().startswith("utf") else _PLAIN
     text = Text(no_wrap=True)
     for i, row in enumerate(layout.cells):
         text.append("\n" if i else "")
@@ -62,17 +57,12 @@ def _ink(ground: str) -> str:
     return "#1d120a" if 0.299 * red + 0.587 * green + 0.114 * blue > 130 else "#ffffff"
 
 
-def board_for(console: Console, layout: OvercookedLayout) -> Text:
-    """A kitchen in the characters that this console can show."""
-    return board(layout, fancy=console.encoding.lower().startswith("utf"))
-
-
 _ON_TOP = {"circle": "●", "triangle": "▲", "square": "■", "star": "★", "diamond": "◆", "heart": "♥", "plus": "✚"}
-_COLUMN, _LINE = 0.02, 0.04  # metres of a character of a tabletop
+_COLUMN, _LINE = 0.02, 0.04  # metres of a character of a table
 
 
 def table_text(console: Console, layout: TabletopLayout) -> Text:
-    """A tabletop as a map of characters, 2 cm by 4 cm each, in the colours of its drawings.
+    """A table as a map of characters, 2 cm by 4 cm each, in the colours of its drawings.
 
     An object is its shape (or the initial of it, where the console shows plain characters only) and the initial of its
     colour; virtual obstacles are lines, starts of the hand ``o``.
@@ -97,10 +87,10 @@ def table_text(console: Console, layout: TabletopLayout) -> Text:
     for obstacle in layout.obstacles:
         for x, y in _along(obstacle.at, obstacle.angle, obstacle.size[0]):
             put(x, y, "▒" if fancy else "#", f"{TABLE['obstacle_edge']} on {TABLE['obstacle']}")
-    for thing in layout.objects:
-        colour, letter = hex_of(thing.colour), thing.shape[0].upper()
-        symbol = _ON_TOP.get(thing.shape, letter) if fancy else letter
-        put(*thing.at, f"{symbol}{thing.colour[0]}", f"bold {_ink(colour)} on {colour}")
+    for box in layout.objects:
+        colour, letter = hex_of(box.colour), box.shape[0].upper()
+        symbol = _ON_TOP.get(box.shape, letter) if fancy else letter
+        put(*box.at, f"{symbol}{box.colour[0]}", f"bold {_ink(colour)} on {colour}")
     text = Text(no_wrap=True)
     for i, line in enumerate(cells):
         text.append("\n" if i else "")

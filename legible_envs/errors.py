@@ -34,7 +34,7 @@ class WorkspaceError(ValueError):
     """A workspace breaks the contract of :class:`~legible_envs.workspace.Workspace`.
 
     Attributes:
-        problems: One sentence for each thing that is wrong.
+        problems: One sentence for each problem.
     """
 
     def __init__(self, message: str, problems: tuple[str, ...] = ()) -> None:

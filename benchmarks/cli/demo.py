@@ -1,7 +1,7 @@
 """``legible demo``: the project's main job, on real input, in under a minute.
 
-Search a legible kitchen, set it beside a random one and the efficient one, and ask how well predictors read recorded
-people.
+Search a legible kitchen, set it beside a random one and the efficient one, and measure how well predictors predict the
+goals of recorded people.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks.console import table
-from benchmarks.presenters.base import Condition
-from benchmarks.presenters.overcooked import boards
+from benchmarks.presenters.base import Panel
+from benchmarks.presenters.overcooked import panels_text
 from benchmarks.reports.search_report import write_best_image, write_report
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from legible_envs.overcooked.design.workspace import OvercookedWorkspace
     from legible_envs.workspace import Workspace
 
-__all__ = ["RANDOM_LAYOUTS", "conditions", "recorded_play", "run_demo", "write_boards_image"]
+__all__ = ["RANDOM_LAYOUTS", "make_panels", "recorded_play", "run_demo", "write_panels_image"]
 
 SHAPE = (7, 7)
 EVALUATIONS = 600_000
@@ -74,18 +74,18 @@ def run_demo(
     if result.best_genome is None:
         raise ValueError(f"no layout scored in {evaluations:,} evaluations; allow more")
     with _step(console, "Searching the efficient kitchen, drawing random ones"):
-        found = conditions(workspace, result.best_genome, seed=seed, evaluations=efficient_evaluations)
-    with _step(console, "Reading recorded people"):
+        found = make_panels(workspace, result.best_genome, seed=seed, evaluations=efficient_evaluations)
+    with _step(console, "Predicting the goals of recorded people"):
         people = recorded_play(fetch=not offline)
     write_best_image(out)
-    image = write_boards_image(out, workspace, found)
-    page = write_report(out, conditions=found, recorded_play=people)
+    image = write_panels_image(out, workspace, found)
+    page = write_report(out, panels=found, recorded_play=people)
     console.print()
-    console.print(boards(console, found))
+    console.print(panels_text(console, found))
     console.print()
     if people.get("table"):
         rows_of_table = [dict(zip(people["table"]["columns"], row, strict=True)) for row in people["table"]["rows"]]
-        console.print("Recorded people: goals read correctly", style="bold")
+        console.print("Recorded people: goals predicted correctly", style="bold")
         console.print(table(rows_of_table))
     console.print(people["note"], style="dim")
     console.print(f"\npicture {image}\nreport  {page}")
@@ -94,14 +94,14 @@ def run_demo(
 
 @contextmanager
 def _step(console: Console, what: str) -> Iterator[None]:
-    """Say what is going on while it does."""
+    """Print what is going on while it lasts."""
     with console.status(what):
         if not console.is_terminal:
             console.print(what)
         yield
 
 
-def conditions(workspace: Workspace, best: npt.NDArray[Any], *, seed: int, evaluations: int) -> list[Condition]:
+def make_panels(workspace: Workspace, best: npt.NDArray[Any], *, seed: int, evaluations: int) -> list[Panel]:
     """The random, the efficient and the legible layout, ready to be shown side by side.
 
     Args:
@@ -120,15 +120,15 @@ def conditions(workspace: Workspace, best: npt.NDArray[Any], *, seed: int, evalu
     ).best_genome
     assert efficient is not None  # efficiency is defined for every valid layout
     return [
-        _condition(workspace, "random", median, f"the median of {RANDOM_LAYOUTS:,} random layouts by legibility"),
-        _condition(workspace, "efficient", efficient, "the shortest task that a search found"),
-        _condition(workspace, "legible", best, "the best layout of this search"),
+        _panel(workspace, "random", median, f"the median of {RANDOM_LAYOUTS:,} random layouts by legibility"),
+        _panel(workspace, "efficient", efficient, "the shortest task that a search found"),
+        _panel(workspace, "legible", best, "the best layout of this search"),
     ]
 
 
-def _condition(workspace: Workspace, name: str, genome: npt.NDArray[Any], note: str) -> Condition:
+def _panel(workspace: Workspace, name: str, genome: npt.NDArray[Any], note: str) -> Panel:
     summary = workspace.summary(genome)
-    return Condition(
+    return Panel(
         name=name,
         layout=workspace.decode(genome),
         score=summary["score"],
@@ -138,29 +138,31 @@ def _condition(workspace: Workspace, name: str, genome: npt.NDArray[Any], note: 
     )
 
 
-def write_boards_image(out: Path, workspace: OvercookedWorkspace, found: list[Condition]) -> Path:
-    """Write ``boards.png``: the conditions side by side, each with the cells where the goal is in doubt."""
+def write_panels_image(out: Path, workspace: OvercookedWorkspace, found: list[Panel]) -> Path:
+    """Write ``boards.png``: the panels side by side, each with the cells where the goal is confused."""
     from legible_envs.overcooked.rendering import draw_ambiguity, draw_side_by_side, save_png
 
     return save_png(
         out / "boards.png",
         draw_side_by_side(
-            [draw_ambiguity(c.layout, workspace.ambiguity(c.layout), tile=44) for c in found],
-            [c.name for c in found],
-            [f"legibility {c.score:.1f}\ndistance {c.distance:.0f} steps" for c in found],
+            [draw_ambiguity(p.layout, workspace.ambiguity(p.layout), tile=44) for p in found],
+            [p.name for p in found],
+            [f"legibility {p.score:.1f}\ndistance {p.distance:.0f} steps" for p in found],
         ),
     )
 
 
 def recorded_play(folder: Path | None = None, *, fetch: bool = True) -> dict[str, Any]:
-    """How well two predictors read recorded people, as :func:`~benchmarks.reports.search_report.write_report` shows it.
+    """How well two predictors predict recorded people's goals.
+
+    In the form that :func:`~benchmarks.reports.search_report.write_report` takes.
 
     Args:
         folder: Where the recordings are or shall be; None means the user's cache folder.
         fetch: Whether to fetch them if they are not there yet.
 
     Returns:
-        ``note``, and unless there are no recordings to be had, ``fractions``, ``curves`` and ``table``.
+        ``note`` and, where there are recordings, ``fractions``, ``curves`` and ``table``.
     """
     from legible_envs.datasets.overcooked_2019 import RecordingsError, fetch_recordings, load_recorded_games
 
@@ -196,12 +198,12 @@ def _summed_up(scores: pd.DataFrame) -> dict[str, Any]:
     ]
     return {
         "note": (
-            f"{sum(row[1] for row in rows):,} recorded walks of real players (Carroll et al., NeurIPS 2019) in "
-            f"{len(kitchens)} kitchens that nobody designed to be read. Accuracy by share of the walk observed "
+            f"{sum(row[1] for row in rows):,} recorded trajectories of real players (Carroll et al., NeurIPS 2019) in "
+            f"{len(kitchens)} kitchens that were not designed to be legible. Accuracy by share observed "
             f"(in {scores.attrs['cut']}), ties shared out; every dispenser in reach is a candidate. The table averages "
             f"over {fractions[0]:.0%} to {fractions[-1]:.0%}."
         ),
         "fractions": fractions,
         "curves": [{"label": p, "values": [float(curve[p, f]) for f in fractions]} for p in predictors],
-        "table": {"columns": ["kitchen", "walks", *predictors, "chance"], "rows": rows},
+        "table": {"columns": ["kitchen", "trajectories", *predictors, "chance"], "rows": rows},
     }

@@ -1,4 +1,4 @@
-"""The command ``legible humans judge``."""
+"""The command ``legible humans evaluate``."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ if TYPE_CHECKING:
     import pandas as pd
     from rich.console import Console
 
-__all__ = ["judge", "judge_people"]
+__all__ = ["evaluate", "evaluate_predictors"]
 
 
 @click.command()
 @click.option("--from", "folder", type=click.Path(exists=True, file_okay=False, path_type=Path),
               help="The folder `legible humans fetch --out` wrote.")  # fmt: skip
 @click.option("--pointing", type=click.Path(exists=True, dir_okay=False, path_type=Path),
-              help="A table of real pointing (.csv.gz): judge predictors of reaches on it too.")  # fmt: skip
-@click.option("--neural/--no-neural", default=None, help="Judge networks too. [default: where torch is installed]")
+              help="A file of real pointing (.csv.gz): evaluate predictors of reaches on it too.")  # fmt: skip
+@click.option("--neural/--no-neural", default=None, help="Evaluate networks too. [default: where torch is installed]")
 @click.option("--layout", "layouts", multiple=True, metavar="NAME", help="Only this kitchen; repeatable.")
 @click.option("--repeats", type=click.IntRange(min=1), default=3, show_default=True, help="Of the cross-validation.")
 @click.option("--out", type=click.Path(file_okay=False, path_type=Path), help="Folder to write tables to.")
-def judge(
+def evaluate(
     folder: Path | None,
     pointing: Path | None,
     neural: bool | None,
@@ -31,18 +31,17 @@ def judge(
     repeats: int,
     out: Path | None,
 ) -> None:
-    """Judge every predictor on the recorded games.
+    """Evaluate every predictor on the recorded games.
 
-    Prints accuracy in each kitchen and, in brackets, the difference from what was measured before with other
-    implementations; minutes, or a quarter of an hour with networks. With --out, also writes it as Markdown, and all
-    figures as CSV.
+    Prints accuracy in each kitchen and, in brackets, the difference from what other implementations measured; takes
+    minutes, or a quarter of an hour with networks. With --out, also writes it as Markdown, and all figures as CSV.
     """
     from benchmarks.console import say
 
-    judge_people(say(), folder, pointing=pointing, neural=neural, layouts=layouts, repeats=repeats, out=out)
+    evaluate_predictors(say(), folder, pointing=pointing, neural=neural, layouts=layouts, repeats=repeats, out=out)
 
 
-def judge_people(
+def evaluate_predictors(
     console: Console,
     folder: Path | None = None,
     *,
@@ -52,13 +51,13 @@ def judge_people(
     repeats: int = 3,
     out: Path | None = None,
 ) -> None:
-    """What the command does.
+    """Evaluate predictors on recorded people, and print and write the tables.
 
     Args:
         console: Where to print.
         folder: Where the recordings are; None means the user's cache folder.
-        pointing: The table of real pointing; None leaves it out.
-        neural: Whether to judge networks; None means if torch is there.
+        pointing: The file of real pointing; None leaves it out.
+        neural: Whether to evaluate networks; None means if torch is installed.
         layouts: Kitchens; none means all.
         repeats: Of the cross-validation.
         out: Folder to write to.
@@ -80,7 +79,7 @@ def judge_people(
 
     unknown = [name for name in layouts if name not in LAYOUTS]
     if unknown:
-        raise ValueError(f"no walks are recorded in {unknown}; choose from {list(LAYOUTS)}")
+        raise ValueError(f"no trajectories are recorded in {unknown}; choose from {list(LAYOUTS)}")
     notes: list[str] = []
     with_networks = _networks_wanted(neural, notes)
     experiment = Experiment(
@@ -89,7 +88,7 @@ def judge_people(
     with console.status("") as status:
         found = {"kitchens": score_recorded_play(folder, experiment, tell=status.update)}
         if pointing is None:
-            notes.append("Real pointing was not judged: --pointing names its file.")
+            notes.append("Real pointing was not evaluated: --pointing names its file.")
         else:
             settings = (*POINTING_PREDICTORS, *(POINTING_NEURAL if with_networks else ()))
             found["pointing"] = score_pointing(pointing, predictors=settings, tell=status.update)
@@ -100,7 +99,7 @@ def judge_people(
 
 
 def _networks_wanted(neural: bool | None, notes: list[str]) -> bool:
-    """Whether networks are judged; not asked for, they are left out with a note where torch is not installed."""
+    """Whether networks are evaluated; where torch is not installed, a note says that they are left out."""
     from predictors.neural.training import require_torch
 
     if neural is False:
@@ -110,7 +109,7 @@ def _networks_wanted(neural: bool | None, notes: list[str]) -> bool:
     except ImportError as error:
         if neural:
             raise
-        notes.append(f"Networks were not judged: {error}")
+        notes.append(f"Networks were not evaluated: {error}")
         return False
     return True
 
@@ -120,8 +119,8 @@ def _print(console: Console, name: str, scores: pd.DataFrame, out: Path | None) 
     from benchmarks.experiments.prediction.analysis import accuracy_table, reference_rows, to_markdown
 
     rows = reference_rows(scores)
-    walks = scores.groupby("layout", sort=False)["walks"].first()
-    counts = ", ".join(f"{layout} {count:,} walks" for layout, count in walks.items())
+    numbers = scores.groupby("layout", sort=False)["walks"].first()
+    counts = ", ".join(f"{layout} {count:,} trajectories" for layout, count in numbers.items())
     about = f"fraction f observed means {scores.attrs['definition']}; ties {scores.attrs['ties']}"
     console.print(f"{name}: mean accuracy over 10..90 % (difference from before)", style="bold")
     console.print(table(rows))

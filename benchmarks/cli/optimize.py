@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from collections.abc import Collection, Mapping
 from pathlib import Path
@@ -10,47 +11,48 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from benchmarks.console import number
-from benchmarks.presenters.base import Part, Presenter, presenter_of
+from benchmarks.presenters.base import Part, Presenter, summary_of
+from benchmarks.presenters.registry import presenter_of, usable_presenters, workspace_of
+from legible_envs.workspace import workspace_class
 from optimizers.errors import SearchError
 from optimizers.runs.folder import RunFolder, is_run_folder
 
 if TYPE_CHECKING:
+    from legible_envs.support.plugins import Plugin
     from optimizers import SearchResult
 
-__all__ = ["check_options", "default_folder", "emitter_rows", "run_search", "write_pictures"]
+__all__ = ["check_options", "default_folder", "emitter_rows", "run_search", "workspace_rows", "write_pictures"]
 
 
 def default_folder(domain: str, settings: Mapping[str, Any]) -> Path:
-    """Where a search is written that names no folder."""
+    """The folder of a search that names none."""
+    name = re.sub(r"[^\w-]+", "-", domain)
     if settings.get("start_from"):
-        return Path("runs") / f"{domain}-from-{Path(settings['start_from']).stem}-seed{settings['seed']}"
-    return Path("runs") / f"{domain}-{presenter_of(domain).folder_name(settings)}-seed{settings['seed']}"
+        return Path("runs") / f"{name}-from-{Path(settings['start_from']).stem}-seed{settings['seed']}"
+    return Path("runs") / f"{name}-{presenter_of(domain).folder_name(settings)}-seed{settings['seed']}"
 
 
 def check_options(domain: str, given: Collection[str]) -> None:
-    """Refuse options that are about another workspace.
+    """Refuse options of another workspace.
 
     Raises:
         click.UsageError: One was given.
     """
-    from benchmarks.presenters.base import DOMAINS
-
-    for other in DOMAINS:
-        if other != domain:
-            wrong = sorted((presenter_of(other).options - presenter_of(domain).options) & set(given))
-            if wrong:
-                thing = presenter_of(other).thing
-                raise click.UsageError(f"--{wrong[0].replace('_', '-')} is about a {thing}, not about {domain}")
+    own = presenter_of(domain)
+    for other in usable_presenters():
+        wrong = sorted((other.options - own.options) & set(given))
+        if wrong:
+            raise click.UsageError(f"--{wrong[0].replace('_', '-')} is about a {other.noun}, not about {domain}")
 
 
 def run_search(domain: str, out: Path, settings: Mapping[str, Any], given: Collection[str]) -> None:
     """Search, then write ``best.png`` and ``report.html`` beside what the search itself writes.
 
     Args:
-        domain: Name of the workspace.
+        domain: Name of the workspace, or ``module:Class``.
         out: Folder of the run.
-        settings: Options of ``legible optimize``.
-        given: Names of those that the user gave; the others do not count where a search is continued.
+        settings: Options of ``legible optimize``; ``assigned`` are further settings of the workspace.
+        given: Names of the options that the user gave; the others do not count where a search is continued.
 
     Raises:
         SearchError: The folder already holds a search and neither resume nor overwrite is set, or it holds none to
@@ -66,17 +68,23 @@ def run_search(domain: str, out: Path, settings: Mapping[str, Any], given: Colle
     if settings["resume"]:
         before = RunFolder(out).read_config()
         config = dict(before["workspace"])
-        if config.get("workspace") != domain:
+        if not _same_workspace(str(config.get("workspace")), domain):
             raise SearchError(f"{out} holds a search of {config.get('workspace')!r}, not of {domain!r}")
         settings = _continued(before, settings, given)
-    parts = presenter.parts({**config, **presenter.design(settings)}, settings, out)
+    config |= presenter.design(settings) | dict(settings.get("assigned", ()))
+    parts = presenter.parts(config, settings, out)
     results = [_search_part(domain, presenter, part, settings, out) for part in parts]
     _tell(presenter, results[0], parts)
 
 
+def _same_workspace(one: str, other: str) -> bool:
+    """Whether two names mean the same workspace; ``module:Class`` may name what has a short name too."""
+    return one == other or (":" in one + other and workspace_class(one) is workspace_class(other))
+
+
 def _continued(before: Mapping[str, Any], settings: Mapping[str, Any], given: Collection[str]) -> dict[str, Any]:
     """Settings of a search that is continued: its own, except those given anew (which it may refuse)."""
-    always = {"resume", "overwrite", "quiet"}
+    always = {"resume", "overwrite", "quiet", "assigned"}
     kept = {name: value for name, value in settings.items() if name in given or name in always}
     emitter = before["emitter"]
     own: dict[str, Any] = {
@@ -127,17 +135,18 @@ def _search_part(domain: str, presenter: Presenter, part: Part, settings: Mappin
 
 
 def _tell(presenter: Presenter, result: SearchResult, parts: Collection[Part]) -> None:
-    """Say what the search of the folder itself found, and where everything lies."""
+    """Print what the search of the folder itself found, and the files written."""
     from benchmarks.console import say
 
     assert result.folder is not None
     written = write_pictures(result.folder)
     console = say()
     console.print(presenter.text(console, result.best_layout))
-    summary, unit = result.workspace.summary(result.require_genome()), presenter.words["distance_unit"]
+    summary = summary_of(result.workspace, result.require_genome())
+    distance = f"{number(summary['distance'], 1)} {presenter.texts.distance_unit}".strip()
     console.print(
         f"{result.config['objective']['name']} {number(result.best_objective, 4)} "
-        f"(legibility {number(summary['score'])}, distance {number(summary['distance'], 1)} {unit}) "
+        f"(legibility {number(summary['score'])}, distance {distance}) "
         f"after {result.evaluations:,} evaluations in {result.seconds:.1f} s"
     )
     for name, path in written.items():
@@ -151,17 +160,28 @@ def write_pictures(folder: Path) -> dict[str, Path]:
     from benchmarks.reports.search_report import write_best_image, write_report
     from optimizers import load_run
 
-    written, run = {"picture": write_best_image(folder)}, load_run(folder)
-    if (boards := presenter_of(str(run.config["workspace"]["workspace"])).write_boards(run)) is not None:
-        written["boards"] = boards
+    run = load_run(folder)
+    pictures = {"picture": write_best_image(folder), "panels": presenter_of(workspace_of(run)).write_panels(run)}
+    written = {name: path for name, path in pictures.items() if path is not None}
     return {**written, "report": write_report(folder)}
 
 
 def emitter_rows() -> list[dict[str, Any]]:
-    """A row per emitter that can be named: its name, where it comes from, and what it is."""
+    """A row per emitter known by name: its name, its origin, and what it is."""
     from optimizers import list_emitters
 
+    return _plugin_rows(list_emitters())
+
+
+def workspace_rows() -> list[dict[str, Any]]:
+    """A row per workspace known by name: its name, its origin, and what it is."""
+    from legible_envs.workspace import list_workspaces
+
+    return _plugin_rows(list_workspaces())
+
+
+def _plugin_rows(plugins: Mapping[str, Plugin]) -> list[dict[str, Any]]:
     return [
-        {"name": info.name, "from": info.origin, "class": info.target, "what": info.summary()}
-        for info in list_emitters().values()
+        {"name": plugin.name, "from": plugin.origin, "class": plugin.target, "what": plugin.summary()}
+        for plugin in plugins.values()
     ]

@@ -1,4 +1,4 @@
-"""``legible reproduce``: the paper's experiments, and those it could not make."""
+"""``legible reproduce``: the paper's experiments, and others that need simulated people."""
 
 from __future__ import annotations
 
@@ -40,14 +40,14 @@ _PEOPLE = "Participants are simulated or recorded here, not those of the paper."
 EXPERIMENTS: Final = {
     "overcooked": Experiment(
         {".": "benchmarks.experiments.overcooked", "recorded": "benchmarks.experiments.recorded"},
-        "Are goals in legible kitchens predicted better?",
-        "Random, efficient, legible-efficient and legible kitchens, and which predictors tell early where a cook goes. "
+        "Are goals predicted better in legible kitchens?",
+        "Random, efficient, legible-efficient and legible kitchens, and how early predictors tell a cook's goal. "
         f"{_PEOPLE}",
     ),
     "tabletop": Experiment(
         {".": "benchmarks.experiments.tabletop"},
-        "Are goals at legible tables predicted better, and does a robot profit?",
-        "Sorted cubes, better places, virtual obstacles, and both; goals predicted offline, then by a robot partner. "
+        "Are goals predicted better at legible tables, and does a robot profit?",
+        "Sorted cubes, better places, virtual obstacles, and both: goals predicted, then a robot at the same table. "
         f"{_PEOPLE}",
     ),
     "optimizers": Experiment(
@@ -68,7 +68,7 @@ def run_experiment(
     scheduler: str | None = None,
     progress: Callable[[Event], object] | None = None,
 ) -> Path:
-    """Run what has not been run yet, analyse all of it, and write the report.
+    """Run the trials that are missing, analyse all of them, and write the report.
 
     Args:
         name: One of :data:`EXPERIMENTS`.
@@ -122,9 +122,9 @@ def reproduce(
     scheduler: str | None,
     quiet: bool,
 ) -> None:
-    """Run an experiment of the paper, and what the paper left out.
+    """Run an experiment of the paper again.
 
-    Writes result files, tables, figures and report.html. Interrupted, it goes on where it stopped.
+    Writes result files, tables, figures and report.html. After an interruption the same command continues.
     """
     from benchmarks.trials import TrialsFailed
     from benchmarks.trials.progress import TrialsProgress
@@ -142,7 +142,7 @@ def reproduce(
                 progress=progress,
             )
     except KeyboardInterrupt:
-        click.echo(f"stopped; finished trials are kept in {folder}, the same command goes on from there", err=True)
+        click.echo(f"stopped; finished trials are kept in {folder}; the same command continues from there", err=True)
         raise click.exceptions.Exit(130) from None
     except TrialsFailed as error:
         raise click.ClickException(str(error)) from error
@@ -151,7 +151,7 @@ def reproduce(
 
 
 def _tell(folder: Path) -> None:
-    """What was written."""
+    """Print the files written."""
     for kind in ("tables", "figures"):
         found = sorted(path.name for path in (folder / kind).glob("*") if path.is_file())
         if found:

@@ -38,7 +38,7 @@ def sweep(file: Path, out: Path | None, workers: int | None, scheduler: str | No
     except TrialsFailed as error:
         rows, failed = error.table, error
     except KeyboardInterrupt:
-        click.echo(f"stopped; finished trials are kept in {folder}, the same command goes on from there", err=True)
+        click.echo(f"stopped; finished trials are kept in {folder}; the same command continues from there", err=True)
         raise click.exceptions.Exit(130) from None
     if len(rows):
         say().print(table(for_reading(rows)))

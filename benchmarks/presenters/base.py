@@ -1,22 +1,31 @@
-"""What the command line and the report need to know about a workspace: how its layouts are named, drawn and told.
+"""What the command line and the report need to know about a workspace: how its layouts are named, printed and drawn.
 
-Each built-in workspace has one presenter; everything else that ``legible`` does is the same for all of them.
+A presenter knows one workspace; everything else that ``legible`` does is the same for all of them. A workspace without
+a presenter of its own is presented by :class:`Presenter` itself: its layouts as text, its summary as facts, no picture.
+
+A package brings a presenter for its workspace, under the same name, with one line of ``pyproject.toml``::
+
+    [project.entry-points."legible.presenters"]
+    aisle = "my_package.presenter:AislePresenter"
 """
 
 from __future__ import annotations
 
-import sys
-from abc import ABC, abstractmethod
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, Final
 
+import click
 import numpy as np
 import numpy.typing as npt
 
+from benchmarks.console import number
 from legible_envs.errors import LayoutError
-from optimizers.runs.folder import is_run_folder
+from legible_envs.layout_kinds import kind_named, kind_of, list_layout_kinds
+from legible_envs.workspace import make_workspace
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
@@ -28,28 +37,30 @@ if TYPE_CHECKING:
     from predictors import GoalPredictor
 
 __all__ = [
-    "DOMAINS",
-    "Condition",
+    "WANTED",
     "Design",
+    "Panel",
     "Part",
     "Presenter",
-    "load_design",
-    "loss_row",
-    "presenter_of",
-    "read_source",
+    "ReportTexts",
+    "as_genome",
+    "refuse",
+    "summary_of",
+    "template",
+    "text_of",
 ]
 
-DOMAINS = ("overcooked", "tabletop")
-"""Workspaces that ``legible optimize`` searches."""
+WANTED: Final = {"legibility": "legible", "efficiency": "efficient", "legible-efficient": "legible and efficient"}
+"""Objectives as adjectives."""
 
 
 @dataclass(frozen=True)
-class Condition:
-    """One way of making a layout, to be shown beside the others.
+class Panel:
+    """One layout of those that a report shows side by side.
 
     Attributes:
-        name: What it is called, such as ``"random"``.
-        layout: A layout that stands for it.
+        name: Its title, such as ``"random"``.
+        layout: The layout.
         score: Its legibility.
         distance: Expected floor moves, or metres, of the whole task.
         normalised: Legibility as a share of the highest conceivable, at most 1.
@@ -67,7 +78,34 @@ class Condition:
 
 
 @dataclass(frozen=True)
-class Design(ABC):
+class ReportTexts:
+    """Texts of a report that depend on the workspace.
+
+    Attributes:
+        axes: Measures in words, by their names.
+        archive: Ends the sentence "Each square is the best layout found …".
+        panels: What the layouts side by side have in common, and what to look for.
+        best: Which layouts "The best layouts" shows.
+        distance: What the distance is.
+        distance_unit: Its unit; empty where it has none.
+        distance_digits: Decimals of a distance.
+        made: Over what the legibility (Eq. 2 and 3) is averaged; empty where it is not that of the equations.
+        measured: How the distance is measured.
+    """
+
+    axes: Mapping[str, str] = field(default_factory=dict)
+    archive: str = "at that place of the two measures"
+    panels: str = "The same task in other layouts."
+    best: str = "The best layout of each column of the map, for the highest-scoring ones."
+    distance: str = "of one task"
+    distance_unit: str = ""
+    distance_digits: int = 2
+    made: str = ""
+    measured: str = ""
+
+
+@dataclass(frozen=True)
+class Design:
     """One layout named on the command line.
 
     Attributes:
@@ -76,63 +114,87 @@ class Design(ABC):
         genome: ``(d,)`` the layout in that workspace, or None.
         broken_rule: Why it has no genome, in a sentence.
         settings: Settings of the score that were asked for.
+        presenter: The presenter that prints and draws it, unless a subclass does.
     """
-
-    thing: ClassVar[str]
 
     layout: Any
     workspace: Any
     genome: npt.NDArray[Any] | None
-    broken_rule: str
+    broken_rule: str = ""
     settings: dict[str, Any] = field(default_factory=dict)
+    presenter: Presenter | None = field(default=None, kw_only=True)
+
+    @property
+    def noun(self) -> str:
+        """What a layout is called."""
+        return "layout" if self.presenter is None else self.presenter.noun
+
+    @property
+    def picture(self) -> str:
+        """What its picture shows, in a few words; empty where there is no picture."""
+        draws = self.presenter is not None and type(self.presenter).draw is not Presenter.draw
+        return f"the {self.noun}" if draws else ""
 
     def summary(self) -> dict[str, Any]:
         """Score, distance and what belongs beside them."""
         return dict(self.workspace.summary(self.genome)) if self.genome is not None else self._summary_outside()
 
     def explain(self) -> list[dict[str, Any]]:
-        """A row per stage and goal, the greatest loss first."""
+        """Where the score comes from: a row per stage and goal, the greatest loss first."""
         return list(self.workspace.explain(self.genome)) if self.genome is not None else self._explain_outside()
 
-    @abstractmethod
     def _summary_outside(self) -> dict[str, Any]:
-        """The summary of a layout outside the design rules."""
+        """The summary of a layout outside the design rules.
 
-    @abstractmethod
+        Raises:
+            LayoutError: This workspace scores no such layouts.
+        """
+        raise LayoutError(self.broken_rule, rule="design")
+
     def _explain_outside(self) -> list[dict[str, Any]]:
         """The rows of a layout outside the design rules."""
+        return []
 
-    @abstractmethod
     def facts(self) -> list[tuple[str, str]]:
         """Names and values that ``legible score`` prints, a line each."""
+        values = self.summary() if self.genome is None else summary_of(self.workspace, self.genome)
+        named = {"score": "legibility"}
+        return [(named.get(key, key.replace("_", " ")), _shown(value)) for key, value in values.items()]
 
-    @abstractmethod
     def text(self, console: Console) -> RenderableType:
         """The layout for a terminal."""
+        return (self.presenter or Presenter()).text(console, self.layout)
 
-    @abstractmethod
-    def draw(self) -> Image:
-        """The layout with what is in doubt where, as ``legible show --out`` writes it."""
+    def draw(self) -> Image | None:
+        """The layout as ``legible show --out`` writes it, best with an observer's confusion; None without a picture."""
+        return None if self.presenter is None else self.presenter.draw(self.layout, self.workspace)
 
     def write_picture(self, path: Path | None) -> tuple[str, Path] | None:
-        """Write the picture of ``legible show``: what it shows, and where it is; None where nobody asked for one."""
+        """Write the picture of ``legible show``: what it shows, and where it is; None without a path.
+
+        Raises:
+            ValueError: Layouts of this workspace have no picture.
+        """
         if path is None:
             return None
         from legible_envs.drawing import save_png
 
-        return "where goals are in doubt", save_png(path, self.draw())
+        picture = self.draw()
+        if picture is None:
+            raise ValueError(f"this {self.noun} has no picture: a presenter of its workspace can draw one")
+        return self.picture, save_png(path, picture)
 
     def compared(self) -> list[dict[str, Any]]:
         """Rows about this layout and those that its run compares it with; none where there are none."""
         return []
 
-    @abstractmethod
-    def readers(self) -> list[tuple[str, GoalPredictor]]:
-        """Predictors without parameters to learn that walks made here are read with, by name."""
+    def predictors(self) -> list[tuple[str, GoalPredictor]]:
+        """Predictors without parameters to learn, by name, that ``legible score --trajectories`` evaluates."""
+        return []
 
-    @abstractmethod
-    def was_walked(self, walk: Trajectory) -> bool:
-        """Whether a recorded walk (or reach) was made here."""
+    def recorded_here(self, trajectory: Trajectory) -> bool:
+        """Whether a trajectory was recorded in this layout."""
+        return bool(trajectory.layout == self.layout)
 
 
 @dataclass(frozen=True)
@@ -150,156 +212,165 @@ class Part:
     title: str = ""
 
 
-class Presenter(ABC):
+class Presenter:
     """How the layouts of a workspace are asked for, printed, drawn, and put on the page of a report.
+
+    Every method has a plain default, so that a presenter says only what its workspace has of its own.
+
+    Args:
+        name: Name of the workspace; None takes that of the class.
 
     Attributes:
         name: Name of the workspace.
-        thing: What one layout is called.
+        noun: What one layout is called.
         options: Options of ``legible optimize`` that only this workspace has.
-        words: Texts of the report, by where they stand; see :func:`benchmarks.reports.search_report.report_data`.
-        script: Template file that draws layouts on the page.
-        icons: Template file of pictures the script uses, or None.
+        texts: Texts of the report.
     """
 
-    name: ClassVar[str]
-    thing: ClassVar[str]
-    options: ClassVar[frozenset[str]]
-    words: ClassVar[dict[str, Any]]
-    script: ClassVar[str]
-    icons: ClassVar[str | None] = None
+    name: str = ""
+    noun: str = "layout"
+    options: frozenset[str] = frozenset()
+    texts: ReportTexts = ReportTexts()
 
-    @abstractmethod
-    def design(self, settings: Mapping[str, Any]) -> dict[str, Any]:
-        """Settings of the workspace from options of the command line; options that are absent say nothing."""
+    def __init__(self, name: str | None = None) -> None:
+        if name is not None:
+            self.name = name
 
-    @abstractmethod
-    def folder_name(self, settings: Mapping[str, Any]) -> str:
-        """Where a search is written that names no folder, without its seed."""
+    # -- the command line ------------------------------------------------------------------------------------------
 
-    @abstractmethod
-    def parts(self, config: Mapping[str, Any], settings: Mapping[str, Any], out: Path) -> list[Part]:
-        """The searches to make for a workspace's settings; the first is that of the folder itself."""
+    def recognises(self, text: str, source: str) -> bool:
+        """Whether a text is meant as a layout of this workspace; ``source`` is its path, or ``-``."""
+        return False
 
-    @abstractmethod
-    def text(self, console: Console, layout: Any) -> RenderableType:
-        """A layout for a terminal."""
+    def read_design(self, text: str, name: str, asked: Mapping[str, Any]) -> Design:
+        """A layout from its text.
 
-    @abstractmethod
-    def draw(self, layout: Any, workspace: Any) -> Image:
-        """A layout as a picture."""
+        Args:
+            text: The text, as the layout kind of the workspace's name writes it; without such a kind, the layout.
+            name: What to call the source in messages.
+            asked: Settings of the score given on the command line.
 
-    @abstractmethod
+        Raises:
+            LayoutError: It is malformed, or breaks the design rules.
+            ValueError: The workspace does not know a setting.
+        """
+        workspace = make_workspace(self.name, **asked)
+        layout: Any = text.strip("\r\n")
+        if workspace.name in list_layout_kinds():
+            layout = kind_named(workspace.name).from_text(text)
+        return Design(layout, workspace, np.asarray(workspace.encode(layout)), "", dict(asked), presenter=self)
+
     def design_of_run(self, run: SearchResult, asked: Mapping[str, Any]) -> Design:
         """The best layout of a run; ``asked`` are settings of the score given on the command line."""
+        workspace = make_workspace({**run.config["workspace"], **asked}) if asked else run.workspace
+        genome = run.require_genome()
+        return Design(run.workspace.decode(genome), workspace, genome, "", dict(asked), presenter=self)
 
-    def write_boards(self, run: SearchResult, path: Path | None = None) -> Path | None:
+    def design(self, settings: Mapping[str, Any]) -> dict[str, Any]:
+        """Settings of the workspace from options of the command line; options that are absent say nothing.
+
+        Raises:
+            click.UsageError: An option that this workspace does not offer.
+        """
+        if settings.get("start_from") is not None:
+            raise click.UsageError(f"--start-from does not apply: {self.name} offers no layout to begin with")
+        return {"prefix": settings["prefix"]} if settings.get("prefix") is not None else {}
+
+    def folder_name(self, settings: Mapping[str, Any]) -> str:
+        """Where a search is written that names no folder, without its workspace and seed."""
+        return str(settings["objective"])
+
+    def parts(self, config: Mapping[str, Any], settings: Mapping[str, Any], out: Path) -> list[Part]:
+        """The searches to make for a workspace's settings; the first is that of the folder itself."""
+        return [Part(out, make_workspace(config))]
+
+    def text(self, console: Console, layout: Any) -> RenderableType:
+        """A layout for a terminal."""
+        from rich.text import Text
+
+        return Text(text_of(layout))
+
+    def draw(self, layout: Any, workspace: Any) -> Image | None:
+        """A layout as a picture; None where this workspace has none."""
+        return None
+
+    def write_panels(self, run: SearchResult, path: Path | None = None) -> Path | None:
         """Write the figure of what a run compares into its folder; None where there is no such figure."""
         return None
 
     # -- the page of a report --------------------------------------------------------------------------------------
 
-    @abstractmethod
     def place(self, workspace: Any) -> dict[str, Any]:
         """What the script must know to draw layouts; plain data."""
+        return {}
 
-    @abstractmethod
     def encode(self, layout: Any) -> Any:
         """A layout as the script reads it; plain data, small."""
+        return text_of(layout)
 
-    @abstractmethod
     def title(self, data: Mapping[str, Any]) -> str:
         """The title of the page."""
+        return f"A search for {WANTED.get(data['objective']['name'], 'good')} {self.noun}s: {self.name}"
 
-    def carried(self, workspace: Any, room: int) -> int:
+    def carried(self, workspace: Workspace, room: int) -> int:
         """How many layouts fit into that many bytes."""
-        return room
+        sample = [self.encode(workspace.decode(g)) for g in workspace.sample(8, np.random.default_rng(0))]
+        return room // max(len(json.dumps(layout)) + 1 for layout in sample)
 
-    def ways(self, workspace: Any, layout: Any) -> list[Any]:
+    def paths(self, workspace: Any, layout: Any) -> list[Any]:
         """How people move in a layout, as the script reads it; nothing unless a workspace has such."""
         return []
 
-    def conditions(self, run: SearchResult) -> Sequence[Condition]:
+    def panels(self, run: SearchResult) -> Sequence[Panel]:
         """Layouts to show side by side, found in the run's folder; none unless a workspace has such."""
         return ()
 
+    def script(self) -> str:
+        """JavaScript that defines ``makePlace(data, tools)``, which draws layouts on the page.
 
-def presenter_of(name: str) -> Presenter:
-    """The presenter of a workspace.
+        ``data`` is the report's data, ``data.place`` being :meth:`place`; ``tools`` are ``svg``, ``el``, ``number`` and
+        ``plural``. It returns ``board(layout, paths)``, an element; ``asText(layout)``; ``inWords(label)`` of an axis;
+        and optionally ``obstacles(layout)``, their number.
+        """
+        return template("plain.js")
 
-    Raises:
-        ValueError: The command line cannot draw layouts of this workspace.
-    """
-    if name == "overcooked":
-        from benchmarks.presenters.overcooked import KitchenPresenter
-
-        return KitchenPresenter()
-    if name == "tabletop":
-        from benchmarks.presenters.tabletop import TablePresenter
-
-        return TablePresenter()
-    raise ValueError(
-        f"layouts of the workspace {name!r} cannot be drawn here; known: {list(DOMAINS)}. "
-        "`optimizers.load_run` reads its runs"
-    )
+    def icons(self) -> str:
+        """SVG symbols that the script uses."""
+        return ""
 
 
-def load_design(source: str, *, prefix: Any = None, pots: int | None = None, task: str | None = None) -> Design:
-    """Read what LAYOUT names: a drawing, ``-`` (standard input), a layout's JSON, or the folder of a search.
-
-    Args:
-        source: The path.
-        prefix: Which prefixes count; None means the run's own setting, or ``"mean"``.
-        pots: Soups in progress at once, in a kitchen; None means the run's own setting, or no limit.
-        task: What is built on a table: a name, or the path of a YAML file. None means the run's own, or the one task
-            of the package that has the table's objects.
-
-    Raises:
-        LayoutError: The layout is malformed; the message says where.
-        SearchError: The folder of the search lacks something, or a file there is damaged.
-        OSError: The file cannot be read.
-    """
-    from benchmarks.presenters.overcooked import kitchen_from
-    from benchmarks.presenters.tabletop import is_table, table_from
-
-    asked = {k: v for k, v in (("prefix", prefix), ("pots", pots), ("task", task)) if v is not None}
-    if source != "-" and is_run_folder(source):
-        from optimizers import load_run
-
-        run = load_run(source)
-        return presenter_of(str(run.config["workspace"].get("workspace"))).design_of_run(run, asked)
-    name, text = read_source(source)
-    if is_table(text, source):
-        return table_from(text, name, asked)
-    return kitchen_from(text, name, asked)
+def template(name: str) -> str:
+    """A template file of this package."""
+    return (files("benchmarks") / "templates" / name).read_text(encoding="utf-8")
 
 
-def refuse(asked: Mapping[str, Any], option: str, thing: str) -> None:
-    """Refuse an option that is not about this kind of layout.
+def text_of(layout: Any) -> str:
+    """A layout as text: as its kind writes it, or else as it prints itself."""
+    try:
+        return kind_of(layout).to_text(layout)
+    except LayoutError:
+        return str(layout)
+
+
+def summary_of(workspace: Workspace, genome: Any) -> dict[str, Any]:
+    """The summary of a genome, with score and distance in any case."""
+    own = workspace.summary(genome)
+    missing = {"score": workspace.legibility, "distance": workspace.distance}
+    return {**{key: float(of(genome)) for key, of in missing.items() if key not in own}, **own}
+
+
+def _shown(value: Any) -> str:
+    return number(value, 4) if isinstance(value, float) else str(value)
+
+
+def refuse(asked: Mapping[str, Any], option: str, noun: str) -> None:
+    """Refuse an option that does not apply to this kind of layout.
 
     Raises:
         LayoutError: It was given.
     """
     if option in asked:
-        raise LayoutError(f"--{option} does not apply: this is a {thing}", rule="type")
-
-
-def read_source(source: str) -> tuple[str, str]:
-    """What to call a source in messages, and its text.
-
-    Raises:
-        LayoutError: It is a folder, or not a text file.
-        OSError: The file cannot be read.
-    """
-    if source != "-" and Path(source).is_dir():
-        raise LayoutError(f"{source} is a folder without a config.json: neither a run nor a layout", rule="type")
-    try:
-        text = sys.stdin.read() if source == "-" else Path(source).read_text(encoding="utf-8")
-    except UnicodeDecodeError as error:
-        raise LayoutError(
-            f"{source} is not a text file; expected an ASCII drawing of a kitchen or the JSON of a table", rule="type"
-        ) from error
-    return "standard input" if source == "-" else source, text
+        raise LayoutError(f"--{option} does not apply: this is a {noun}", rule="type")
 
 
 def as_genome(workspace: Any, layout: Any) -> tuple[npt.NDArray[Any] | None, str]:
@@ -308,18 +379,3 @@ def as_genome(workspace: Any, layout: Any) -> tuple[npt.NDArray[Any] | None, str
         return np.asarray(workspace.encode(layout)), ""
     except LayoutError as error:
         return None, str(error)
-
-
-def loss_row(row: Mapping[str, Any]) -> dict[str, Any]:
-    """A row of ``explain()`` in words, for people."""
-    ties = sorted(row["ties_with"].items(), key=lambda item: -item[1])
-    return {
-        "from": row["start"],
-        "to": row["goal"],
-        "among": len(row["goals"]),
-        "times": row["weight"],
-        "score": row["score"],
-        "contribution": row["contribution"],
-        "confused with (share of the way)": ", ".join(f"{name} {share:.0%}" for name, share in ties if share > 0)
-        or "-",
-    }

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import click
 import numpy as np
 import numpy.typing as npt
 
-from benchmarks.console import board_for, number
-from benchmarks.presenters.base import Condition, Design, Part, Presenter, as_genome, load_design, refuse
+from benchmarks.console import kitchen_text, number
+from benchmarks.presenters.base import WANTED, Design, Panel, Presenter, ReportTexts, as_genome, refuse, template
+from benchmarks.presenters.registry import load_design
 from legible_envs.errors import LayoutError
 from legible_envs.overcooked.layout import OvercookedLayout
 
@@ -26,13 +26,14 @@ if TYPE_CHECKING:
     from optimizers import SearchResult
     from predictors import GoalPredictor
 
-__all__ = ["Kitchen", "KitchenPresenter", "boards", "kitchen_from", "load_kitchen"]
+__all__ = ["Kitchen", "KitchenPresenter", "kitchen_from", "load_kitchen", "panels_text"]
 
 
 class Kitchen(Design):
     """A kitchen named on the command line; ``settings`` are ``prefix`` and ``pots``."""
 
-    thing: ClassVar[str] = "kitchen"
+    noun: ClassVar[str] = "kitchen"
+    picture: ClassVar[str] = "where goals are confused"
 
     def _summary_outside(self) -> dict[str, Any]:
         return self._scorer.score_layout(self.layout)
@@ -41,7 +42,7 @@ class Kitchen(Design):
         return self._scorer.explain_layout(self.layout)
 
     def ambiguity(self) -> npt.NDArray[np.float64]:
-        """``(H, W)`` how often an observer would name a wrong goal, NaN where nobody walks."""
+        """``(H, W)`` how often an observer would name a wrong goal; NaN on cells that no path crosses."""
         if self.genome is not None:
             return np.asarray(self.workspace.ambiguity(self.genome))
         return self._scorer.ambiguity(self.layout)
@@ -83,7 +84,7 @@ class Kitchen(Design):
 
     def text(self, console: Console) -> RenderableType:
         """The kitchen in the characters that this console can show."""
-        return board_for(console, self.layout)
+        return kitchen_text(console, self.layout)
 
     def draw(self) -> Image:
         """The kitchen with, on each cell, how often an observer would name a wrong goal."""
@@ -91,19 +92,20 @@ class Kitchen(Design):
 
         return draw_ambiguity(self.layout, self.ambiguity(), tile=72, title="Where goals are confused")
 
-    def readers(self) -> list[tuple[str, GoalPredictor]]:
-        """The heuristic, and Eq. 1 of the paper."""
+    def predictors(self) -> list[tuple[str, GoalPredictor]]:
+        """The heuristic, and Bayesian goal inference."""
         from predictors import BayesianGoalPredictor, ShortestDistance
 
         return [("shortest distance", ShortestDistance()), ("Eq. 1", BayesianGoalPredictor())]
 
-    def was_walked(self, walk: Trajectory) -> bool:
-        """Whether the walk has this kitchen's cells, wherever players started."""
-        return isinstance(walk.layout, OvercookedLayout) and bool(np.array_equal(walk.layout.cells, self.layout.cells))
+    def recorded_here(self, trajectory: Trajectory) -> bool:
+        """Whether the trajectory's layout has this kitchen's cells, wherever players started."""
+        layout = trajectory.layout
+        return isinstance(layout, OvercookedLayout) and bool(np.array_equal(layout.cells, self.layout.cells))
 
 
 def load_kitchen(source: str, *, prefix: Any = None, pots: int | None = None) -> Kitchen:
-    """Read a kitchen; see :func:`benchmarks.presenters.base.load_design`.
+    """Read a kitchen; see :func:`benchmarks.presenters.registry.load_design`.
 
     Raises:
         LayoutError: It is malformed, or a table.
@@ -112,7 +114,7 @@ def load_kitchen(source: str, *, prefix: Any = None, pots: int | None = None) ->
     """
     design = load_design(source, prefix=prefix, pots=pots)
     if not isinstance(design, Kitchen):
-        raise LayoutError(f"{source} is a {design.thing}; expected a kitchen", rule="type")
+        raise LayoutError(f"{source} is a {design.noun}; expected a kitchen", rule="type")
     return design
 
 
@@ -141,29 +143,33 @@ def kitchen_from(text: str, name: str, asked: Mapping[str, Any]) -> Kitchen:
 class KitchenPresenter(Presenter):
     """Presents the workspace ``"overcooked"``."""
 
-    name: ClassVar[str] = "overcooked"
-    thing: ClassVar[str] = "kitchen"
-    options: ClassVar[frozenset[str]] = frozenset({"shape", "pots", "lock", "relocation_cost"})
-    script: ClassVar[str] = "kitchen.js"
-    icons: ClassVar[str | None] = "kitchen_icons.html"
-    words: ClassVar[dict[str, Any]] = {
-        "things": "kitchens",
-        "axes": {"obstacles": "virtual obstacles", "order": "reading order of the ingredients"},
-        "archive": "with that many virtual obstacles (up) and its ingredients in that reading order (across)",
-        "conditions": "The same room and the same task. A legible kitchen gives the cook's goal away early; its price "
-        "is the distance walked.",
-        "best": "The best layout of each reading order, for the highest-scoring orders.",
-        "distance": "expected steps of one task",
-        "distance_unit": "steps",
-        "distance_digits": 1,
-        "made": "over all shortest paths, prefixes and valid orders of the task",
-        "measured": "the expected number of floor moves of the whole task",
-        "reach": "walk",
-    }
+    name = "overcooked"
+    noun = "kitchen"
+    options = frozenset({"shape", "pots", "lock", "relocation_cost"})
+    texts = ReportTexts(
+        axes={"obstacles": "virtual obstacles", "order": "reading order of the ingredients"},
+        archive="with that many virtual obstacles (up) and its ingredients in that reading order (across)",
+        panels="The same room and the same task. A legible kitchen gives the cook's goal away early; its price is the "
+        "distance walked.",
+        best="The best layout of each reading order, for the highest-scoring orders.",
+        distance="expected steps of one task",
+        distance_unit="steps",
+        distance_digits=1,
+        made="over all shortest paths, prefixes and valid orders of the task",
+        measured="the expected number of floor moves of the whole task",
+    )
+
+    def recognises(self, text: str, source: str) -> bool:
+        """Always: a text that no other presenter recognises is read as a drawing, whose errors name row and column."""
+        return True
+
+    def read_design(self, text: str, name: str, asked: Mapping[str, Any]) -> Kitchen:
+        """A kitchen from its drawing or an Overcooked-AI ``.layout`` file."""
+        return kitchen_from(text, name, asked)
 
     def design(self, settings: Mapping[str, Any]) -> dict[str, Any]:
         """Shape, prefix, pots, and the kitchen to start from."""
-        found = {key: settings[key] for key in ("shape", "prefix", "pots") if key in settings}
+        found = {key: settings[key] for key in ("shape", "prefix", "pots") if settings.get(key) is not None}
         if settings.get("start_from") is not None:
             kitchen = load_kitchen(settings["start_from"]).layout
             found |= {"shape": kitchen.shape, "start_from": kitchen.to_ascii()}
@@ -177,18 +183,12 @@ class KitchenPresenter(Presenter):
         rows, columns = settings["shape"]
         return f"{rows}x{columns}-{settings['objective']}"
 
-    def parts(self, config: Mapping[str, Any], settings: Mapping[str, Any], out: Path) -> list[Part]:
-        """One search."""
-        from legible_envs.workspace import make_workspace
-
-        return [Part(out, make_workspace(config))]
-
     def text(self, console: Console, layout: OvercookedLayout) -> RenderableType:
         """The kitchen in colour."""
-        return board_for(console, layout)
+        return kitchen_text(console, layout)
 
     def draw(self, layout: OvercookedLayout, workspace: Any, *, tile: int = 64) -> Image:
-        """The kitchen with nobody in it."""
+        """The kitchen without players."""
         from legible_envs.overcooked.rendering import draw_layout
 
         return draw_layout(layout, tile=tile)
@@ -203,6 +203,14 @@ class KitchenPresenter(Presenter):
         return Kitchen(run.best_layout, workspace, genome, "", dict(asked))
 
     # -- the page of a report --------------------------------------------------------------------------------------
+
+    def script(self) -> str:
+        """Draws tiles of the icons."""
+        return template("kitchen.js")
+
+    def icons(self) -> str:
+        """A symbol for every kind of cell."""
+        return template("kitchen_icons.html")
 
     def place(self, workspace: Any) -> dict[str, Any]:
         """Rows and columns."""
@@ -225,22 +233,18 @@ class KitchenPresenter(Presenter):
         return f"A search for {WANTED.get(data['objective']['name'], 'good')} kitchens, {rows} × {columns}"
 
 
-WANTED = {"legibility": "legible", "efficiency": "efficient", "legible-efficient": "legible and efficient"}
-"""Objectives as adjectives."""
-
-
-def boards(console: Console, conditions: Sequence[Condition]) -> Table:
+def panels_text(console: Console, panels: Sequence[Panel]) -> Table:
     """Kitchens side by side, each over its name, its scores and how it was chosen."""
     from rich.table import Table
     from rich.text import Text
 
     grid = Table.grid(padding=(0, 4))
-    for _ in conditions:
+    for _ in panels:
         grid.add_column(max_width=32)
-    grid.add_row(*(board_for(console, c.layout) for c in conditions))
+    grid.add_row(*(kitchen_text(console, p.layout) for p in panels))
     grid.add_row()
-    grid.add_row(*(Text(c.name, style="bold") for c in conditions))
-    grid.add_row(*(f"legibility [bold cyan]{number(c.score)}[/]" for c in conditions))
-    grid.add_row(*(f"distance   [bold]{number(c.distance, 1)}[/]" for c in conditions))
-    grid.add_row(*(Text(c.note, style="dim") for c in conditions))
+    grid.add_row(*(Text(p.name, style="bold") for p in panels))
+    grid.add_row(*(f"legibility [bold cyan]{number(p.score)}[/]" for p in panels))
+    grid.add_row(*(f"distance   [bold]{number(p.distance, 1)}[/]" for p in panels))
+    grid.add_row(*(Text(p.note, style="dim") for p in panels))
     return grid

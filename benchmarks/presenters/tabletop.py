@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from benchmarks.console import number, table_text
-from benchmarks.presenters.base import Design, Part, Presenter, as_genome, load_design, read_source, refuse
-from benchmarks.presenters.tabletop_panels import CONDITIONS, LIST, beta_of, boards_of, listed, write_boards
+from benchmarks.presenters.base import WANTED, Design, Part, Presenter, ReportTexts, as_genome, refuse, template
+from benchmarks.presenters.registry import load_design, read_source
+from benchmarks.presenters.tabletop_panels import CONDITIONS, LIST, beta_of, listed, panels_of, write_panels
 from legible_envs.errors import LayoutError
 from legible_envs.support.files import write_atomically
 from legible_envs.tabletop import TabletopLayout, TabletopTask
@@ -22,9 +23,8 @@ from optimizers.runs.folder import is_run_folder
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
 
-    from benchmarks.presenters.base import Condition
+    from benchmarks.presenters.base import Panel
     from legible_envs.drawing import Image
-    from legible_envs.rollouts.trajectory import Trajectory
     from legible_envs.tabletop.scoring.scorer import TabletopScorer
     from optimizers import SearchResult
     from predictors import GoalPredictor
@@ -41,7 +41,8 @@ class TableDesign(Design):
         run: The search that found it, or None.
     """
 
-    thing: ClassVar[str] = "table"
+    noun: ClassVar[str] = "table"
+    picture: ClassVar[str] = "where goals are confused"
 
     task: TabletopTask | None = None
     run: SearchResult | None = None
@@ -80,7 +81,7 @@ class TableDesign(Design):
         return self._scorer.explain_layout(self.layout)
 
     def facts(self) -> list[tuple[str, str]]:
-        """Score, way, detours, task, and the rule it breaks."""
+        """Score, distance, detours, task, and the rule it breaks."""
         assert self.task is not None
         summary = self.summary()
         part, whole = summary["single_goal_score"], summary["score"]
@@ -113,10 +114,10 @@ class TableDesign(Design):
         )
 
     def write_picture(self, path: Path | None) -> tuple[str, Path] | None:
-        """For a run the boards, into its folder unless told otherwise; else the table."""
+        """For a run the figure of its panels, into its folder unless told otherwise; else the table."""
         if self.run is None:
             return super().write_picture(path)
-        return "boards", write_boards(self.run, path)
+        return "panels", write_panels(self.run, path)
 
     def compared(self) -> list[dict[str, Any]]:
         """The baseline and every condition of a run: score, mean detour and metres of one task."""
@@ -124,27 +125,23 @@ class TableDesign(Design):
             return []
         return [
             {
-                "condition": c.name,
-                "legibility": c.score,
-                "normalised": c.normalised,
-                "mean detour": c.detour,
-                "metres": c.distance,
-                "obstacles": len(c.layout.obstacles),
+                "condition": panel.name,
+                "legibility": panel.score,
+                "normalised": panel.normalised,
+                "mean detour": panel.detour,
+                "metres": panel.distance,
+                "obstacles": len(panel.layout.obstacles),
             }
-            for c in boards_of(self.run)
+            for panel in panels_of(self.run)
         ]
 
-    def readers(self) -> list[tuple[str, GoalPredictor]]:
-        """The heuristic, and Eq. 1 of the paper."""
+    def predictors(self) -> list[tuple[str, GoalPredictor]]:
+        """The heuristic, and Bayesian goal inference."""
         from predictors import StraightLineBayesian
 
         beta = beta_of(self.workspace)
         straight = StraightLineBayesian(beta, obstacles=False)
         return [("straight lines", straight), ("Eq. 1, shortest paths", StraightLineBayesian(beta))]
-
-    def was_walked(self, walk: Trajectory) -> bool:
-        """Whether the reach was made among these things."""
-        return walk.layout == self.layout
 
 
 # -- reading tables ----------------------------------------------------------------------------------------------------
@@ -184,7 +181,7 @@ def table_from(text: str, name: str, asked: Mapping[str, Any]) -> TableDesign:
 
 
 def load_table(source: str, task: str | None = None) -> TableDesign:
-    """Read a table; see :func:`benchmarks.presenters.base.load_design`.
+    """Read a table; see :func:`benchmarks.presenters.registry.load_design`.
 
     Raises:
         LayoutError: It is malformed, or a kitchen.
@@ -199,7 +196,7 @@ def load_table(source: str, task: str | None = None) -> TableDesign:
             raise LayoutError(f"{source} is not the JSON of a table; expected a table", rule="type")
         design = table_from(text, name, {} if task is None else {"task": task})
     if not isinstance(design, TableDesign):
-        raise LayoutError(f"{source} is a {design.thing}; expected a table", rule="type")
+        raise LayoutError(f"{source} is a {design.noun}; expected a table", rule="type")
     return design
 
 
@@ -215,34 +212,39 @@ def _task_of(layout: TabletopLayout, named: str | None) -> TabletopTask:
 class TablePresenter(Presenter):
     """Presents the workspace ``"tabletop"``."""
 
-    name: ClassVar[str] = "tabletop"
-    thing: ClassVar[str] = "table"
-    options: ClassVar[frozenset[str]] = frozenset({"task", "condition"})
-    script: ClassVar[str] = "table.js"
-    words: ClassVar[dict[str, Any]] = {
-        "things": "tables",
-        "axes": {
+    name = "tabletop"
+    noun = "table"
+    options = frozenset({"task", "condition"})
+    texts = ReportTexts(
+        axes={
             "least distance": "least distance of two objects, m",
             "order": "order of the first objects, left to right",
             "mean x": "mean x of the first objects, m",
             "obstacles": "virtual obstacles",
             "mean detour": "mean detour",
         },
-        "archive": "at that place of the two measures",
-        "conditions": "The same objects and the same task. Lines are shortest reaches, darker where an observer cannot "
-        "tell the goal yet. The price of a legible table is the length of the way.",
-        "best": "The best layout of each column of the map, for the highest-scoring ones.",
-        "distance": "expected metres of one task",
-        "distance_unit": "m",
-        "distance_digits": 2,
-        "made": "over observed shares of all shortest reaches and all valid orders of the task",
-        "measured": "the expected length, in metres, of all ways of the hand in one task, fetching and carrying",
-        "reach": "reach",
-    }
+        archive="at that place of the two measures",
+        panels="The same objects and the same task. Lines are shortest reaches, darker where an observer cannot tell "
+        "the goal yet. The price of a legible table is the length of the path.",
+        best="The best layout of each column of the map, for the highest-scoring ones.",
+        distance="expected metres of one task",
+        distance_unit="m",
+        distance_digits=2,
+        made="over observed shares of all shortest reaches and all valid orders of the task",
+        measured="the expected length, in metres, of all paths of the hand in one task, fetching and carrying",
+    )
+
+    def recognises(self, text: str, source: str) -> bool:
+        """Whether it is meant as JSON."""
+        return is_table(text, source)
+
+    def read_design(self, text: str, name: str, asked: Mapping[str, Any]) -> TableDesign:
+        """A table from its JSON."""
+        return table_from(text, name, asked)
 
     def design(self, settings: Mapping[str, Any]) -> dict[str, Any]:
         """Task, prefix, and the table to start from; the condition is chosen by :meth:`parts`."""
-        found = {key: settings[key] for key in ("task", "prefix") if key in settings}
+        found = {key: settings[key] for key in ("task", "prefix") if settings.get(key) is not None}
         if settings.get("start_from") is not None:
             found["start_from"] = load_table(settings["start_from"], settings.get("task")).layout.to_dict()
         return found
@@ -255,8 +257,8 @@ class TablePresenter(Presenter):
     def parts(self, config: Mapping[str, Any], settings: Mapping[str, Any], out: Path) -> list[Part]:
         """A search for every condition, or for one.
 
-        That for ``both`` lies in the folder itself, the others in folders within; a list of them lets a resumed search,
-        the report and ``legible show`` know that they belong together.
+        The search for ``both`` lies in the folder itself, the others in folders within; a list of them tells a resumed
+        search, the report and ``legible show`` that they belong together.
         """
         from legible_envs.workspace import make_workspace
 
@@ -288,9 +290,9 @@ class TablePresenter(Presenter):
 
         return draw_table(layout, task=workspace.task, width=960, ambiguity=True, beta=beta_of(workspace))
 
-    def write_boards(self, run: SearchResult, path: Path | None = None) -> Path:
-        """Write the boards of the paper's figure."""
-        return write_boards(run, path)
+    def write_panels(self, run: SearchResult, path: Path | None = None) -> Path:
+        """Write the panels of the paper's figure."""
+        return write_panels(run, path)
 
     def design_of_run(self, run: SearchResult, asked: Mapping[str, Any]) -> Design:
         """The best table of a run."""
@@ -303,6 +305,10 @@ class TablePresenter(Presenter):
         return TableDesign(run.best_layout, workspace, genome, "", dict(asked), workspace.task, run)
 
     # -- the page of a report --------------------------------------------------------------------------------------
+
+    def script(self) -> str:
+        """Draws boxes, obstacles and reaches."""
+        return template("table.js")
 
     def place(self, workspace: Any) -> dict[str, Any]:
         """Table, objects with outlines of their shapes, and slots; lengths in millimetres, y away from the person."""
@@ -333,7 +339,7 @@ class TablePresenter(Presenter):
                 for o in task.layout.objects
             ],
             "table": top.to_dict(),
-            "things": task.layout.to_dict()["objects"],
+            "boxes": task.layout.to_dict()["objects"],
             "glyphs": {
                 name: " ".join(f"{x:.3g},{y:.3g}" for x, y in points)
                 for name, points in GLYPHS.items()
@@ -358,17 +364,15 @@ class TablePresenter(Presenter):
 
     def title(self, data: Mapping[str, Any]) -> str:
         """What was wanted, and of what."""
-        from benchmarks.presenters.overcooked import WANTED
-
         task = data["config"]["workspace"]["task"]
         name = task if isinstance(task, str) else task["name"]
         return f"A search for {WANTED.get(data['objective']['name'], 'good')} tables: {name}"
 
-    def conditions(self, run: SearchResult) -> Sequence[Condition]:
+    def panels(self, run: SearchResult) -> Sequence[Panel]:
         """The baseline and what every condition found."""
-        return boards_of(run)
+        return panels_of(run)
 
-    def ways(self, workspace: Any, layout: TabletopLayout) -> list[list[list[int]]]:
+    def paths(self, workspace: Any, layout: TabletopLayout) -> list[list[list[int]]]:
         """Shortest reaches as ``[x, y, per cent of ambiguity]`` of points along each, in millimetres."""
         from legible_envs.tabletop.rendering.ambiguity import ambiguous_reaches
 

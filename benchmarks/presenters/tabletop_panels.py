@@ -1,4 +1,4 @@
-"""The boards of a search of tables: the sorted baseline and the best layout of every condition."""
+"""The panels of a search of tables: the sorted baseline and the best layout of every condition."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any, Final
 from optimizers.errors import SearchError
 
 if TYPE_CHECKING:
-    from benchmarks.presenters.base import Condition
+    from benchmarks.presenters.base import Panel
     from optimizers import SearchResult
 
-__all__ = ["CONDITIONS", "LIST", "beta_of", "boards_of", "listed", "write_boards"]
+__all__ = ["CONDITIONS", "LIST", "beta_of", "listed", "panels_of", "write_panels"]
 
 CONDITIONS: Final = {
     "placement": "Placement Optimized",
@@ -24,12 +24,12 @@ LIST: Final = "conditions.json"
 """File in a run's folder that says which conditions were searched together."""
 
 
-def boards_of(run: SearchResult) -> list[Condition]:
+def panels_of(run: SearchResult) -> list[Panel]:
     """The sorted baseline and the best layout of every condition searched in a run's folder.
 
     A condition whose search has not found anything yet is left out.
     """
-    from benchmarks.presenters.base import Condition
+    from benchmarks.presenters.base import Panel
     from optimizers import load_run
 
     runs = {run.config["workspace"]["condition"]: run}
@@ -51,12 +51,12 @@ def boards_of(run: SearchResult) -> list[Condition]:
             count = len(layout.obstacles)
             note = f"the best layout found, with {count} virtual obstacle{'' if count == 1 else 's'}"
             found.append((title, layout, "the best layout found" if name == "placement" else note))
-    conditions = []
+    panels = []
     for title, layout, note in found:
         scores = scorer.score_layouts([layout])
         score = float(scores.legibility[0])
-        conditions.append(
-            Condition(
+        panels.append(
+            Panel(
                 name=title,
                 layout=layout,
                 score=score,
@@ -66,16 +66,16 @@ def boards_of(run: SearchResult) -> list[Condition]:
                 detour=float(scores.mean_detour[0]),
             )
         )
-    return conditions
+    return panels
 
 
-def write_boards(run: SearchResult, path: Path | None = None) -> Path:
-    """Write the figure of a run's boards and the desired configuration; ``boards.png`` in its folder if no path."""
+def write_panels(run: SearchResult, path: Path | None = None) -> Path:
+    """Write the figure of a run's panels and the desired configuration; ``boards.png`` in its folder if no path."""
     from legible_envs.tabletop.rendering import draw_panels, save_png
 
     workspace: Any = run.workspace
-    boards = {condition.name: condition.layout for condition in boards_of(run)}
-    picture = draw_panels(boards, workspace.task, scorer=workspace.scorer, beta=beta_of(workspace))
+    layouts = {panel.name: panel.layout for panel in panels_of(run)}
+    picture = draw_panels(layouts, workspace.task, scorer=workspace.scorer, beta=beta_of(workspace))
     return save_png(path or _folder_of(run) / "boards.png", picture)
 
 
@@ -100,5 +100,5 @@ def listed(folder: Path) -> dict[str, str]:
 
 
 def beta_of(workspace: Any) -> float:
-    """Rationality per metre of a workspace, or the field's where there is none."""
+    """Rationality per metre of a workspace; without one, the field's usual value."""
     return 20.0 if workspace is None else float(workspace.observer.beta)

@@ -1,7 +1,7 @@
 """``report.html``: one self-contained page about a search, readable from disk, from mail, in ten years.
 
 The page makes no request of any kind. Numbers and layouts travel in one JSON block that the page can save as a file;
-drawing happens in the reader's browser.
+a script in the page draws them.
 """
 
 from __future__ import annotations
@@ -9,14 +9,16 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from datetime import datetime
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.presenters.base import Condition, Presenter, loss_row, presenter_of
+from benchmarks.presenters.base import Panel, Presenter, summary_of, template
+from benchmarks.presenters.losses import explains_stages, loss_row
+from benchmarks.presenters.registry import presenter_of, workspace_of
 from benchmarks.reports.prediction_report import FOLDER, evaluation_section
 from legible_envs.support.files import write_atomically
 from optimizers import Elites, SearchResult, load_run
@@ -38,19 +40,20 @@ MAX_POINTS = 240
 def write_report(
     run_folder: str | Path,
     *,
-    conditions: Sequence[Condition] | None = None,
+    panels: Sequence[Panel] | None = None,
     recorded_play: Mapping[str, Any] | None = None,
 ) -> Path:
     """Write ``report.html`` into a run folder, from the files that :func:`optimizers.search` left there.
 
-    What ``legible score RUN --predictor NAME`` found about people is a section of it.
+    The results of ``legible score RUN --predictor NAME`` are a section of it.
 
     Args:
         run_folder: The folder of a finished, interrupted or running search.
-        conditions: Layouts to show side by side; None shows what the run itself compares, if anything.
-        recorded_play: How predictors read recorded people (see :func:`benchmarks.cli.demo.recorded_play`): ``note``,
-            ``fractions``, ``curves`` (each ``label``, ``values``) and ``table`` (``columns``, ``rows``). None leaves
-            the section out; a mapping with only a ``note`` says why there is none.
+        panels: Layouts to show side by side; None shows those that the run itself compares, if any.
+        recorded_play: How well predictors predict recorded people's goals (see
+            :func:`benchmarks.cli.demo.recorded_play`): ``note``, ``fractions``, ``curves`` (each ``label``,
+            ``values``) and ``table`` (``columns``, ``rows``). None leaves the section out; a mapping with only a
+            ``note`` says why there are no results.
 
     Returns:
         The path of the page.
@@ -61,40 +64,44 @@ def write_report(
     folder, run = Path(run_folder), load_run(run_folder)
     path = folder / "report.html"
     presenter = _presenter(run)
-    data = report_data(run, conditions, recorded_play)
-    page = _render(data, presenter, _reaches(run), evaluation_section(folder / FOLDER) or "")
+    data = report_data(run, panels, recorded_play)
+    rows = run.workspace.explain(run.require_genome())
+    page = _render(data, presenter, rows, evaluation_section(folder / FOLDER) or "")
     write_atomically(path, lambda stream: stream.write(page.encode()))
     return path
 
 
-def write_best_image(run_folder: str | Path, **options: Any) -> Path:
-    """Write ``best.png``, a drawing of the run's best layout, into its folder; ``options`` are those of the drawing."""
+def write_best_image(run_folder: str | Path, **options: Any) -> Path | None:
+    """Write ``best.png``, a drawing of the run's best layout, into its folder; ``options`` are those of the drawing.
+
+    Returns:
+        The path; None where layouts of this workspace have no picture.
+    """
     from legible_envs.drawing import save_png
 
-    run = load_run(run_folder)
-    path = Path(run_folder) / "best.png"
-    save_png(path, _presenter(run).draw(run.workspace.decode(run.require_genome()), run.workspace, **options))
-    return path
+    folder, run = Path(run_folder), load_run(run_folder)
+    picture = _presenter(run).draw(run.workspace.decode(run.require_genome()), run.workspace, **options)
+    return None if picture is None else save_png(folder / "best.png", picture)
 
 
 def _presenter(run: SearchResult) -> Presenter:
-    return presenter_of(str(run.config["workspace"].get("workspace")))
+    return presenter_of(workspace_of(run))
 
 
 def report_data(
     run: SearchResult,
-    conditions: Sequence[Condition] | None = None,
+    panels: Sequence[Panel] | None = None,
     recorded_play: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Everything the page shows, as JSON-ready data; this is also what its download button saves."""
     config, presenter, elites = run.config, _presenter(run), run.elites()
     rows, columns = (int(n) for n in config["archive"]["dims"])
-    found = presenter.conditions(run) if conditions is None else conditions
+    found = presenter.panels(run) if panels is None else panels
     return {
-        "schema": 2,
+        "schema": 3,
         "workspace": presenter.name,
         "place": presenter.place(run.workspace),
-        "words": presenter.words,
+        "texts": asdict(presenter.texts),
         "objective": dict(config["objective"]),
         "best": _best(run, presenter),
         "axes": _axes(run, elites, rows, columns),
@@ -102,7 +109,7 @@ def report_data(
         "archive_size": len(elites),
         "archive_dims": [rows, columns],
         "history": _history(run),
-        "conditions": [_condition(c, presenter, run.workspace) for c in found],
+        "panels": [_panel(panel, presenter, run.workspace) for panel in found],
         "recorded_play": _plain({**_NO_PLAY, **recorded_play}) if recorded_play else None,
         "config": {key: value for key, value in config.items() if key != "result"},
         "result": {key: _plain(value) for key, value in (config.get("result") or {}).items() if key != "best_genome"},
@@ -117,7 +124,7 @@ _NO_PLAY: dict[str, Any] = {"note": "", "fractions": [], "curves": [], "table": 
 
 def _best(run: SearchResult, presenter: Presenter) -> dict[str, Any]:
     genome = run.require_genome()
-    summary = {key: _plain(value) for key, value in run.workspace.summary(genome).items()}
+    summary = {key: _plain(value) for key, value in summary_of(run.workspace, genome).items()}
     return {**summary, "layout": presenter.encode(run.workspace.decode(genome))}
 
 
@@ -188,24 +195,23 @@ def _history(run: SearchResult) -> dict[str, list[float | None]]:
     return {name: [_plain(v) for v in table[name].to_numpy(np.float64)[picked]] for name in names}
 
 
-def _condition(condition: Condition, presenter: Presenter, workspace: Any) -> dict[str, Any]:
+def _panel(panel: Panel, presenter: Presenter, workspace: Any) -> dict[str, Any]:
     return {
-        "name": condition.name,
-        "note": condition.note,
-        "layout": presenter.encode(condition.layout),
-        "ways": presenter.ways(workspace, condition.layout),
-        "score": _plain(condition.score),
-        "distance": _plain(condition.distance),
-        "normalised": _plain(condition.normalised),
-        "detour": _plain(condition.detour),
+        "name": panel.name,
+        "note": panel.note,
+        "layout": presenter.encode(panel.layout),
+        "paths": presenter.paths(workspace, panel.layout),
+        "score": _plain(panel.score),
+        "distance": _plain(panel.distance),
+        "normalised": _plain(panel.normalised),
+        "detour": _plain(panel.detour),
     }
 
 
-def _reaches(run: SearchResult) -> list[dict[str, Any]]:
-    """Where the best layout loses and wins most, in words."""
-    rows = run.workspace.explain(run.require_genome())
+def _explained(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """The rows that lose and win most, for reading."""
     worst, best = rows[:WORST_ROWS], rows[WORST_ROWS:][-BEST_ROWS:]
-    return [{str(key): value for key, value in loss_row(row).items()} for row in (*worst, *best)]
+    return [loss_row(row) for row in (*worst, *best)]
 
 
 def _plain(value: Any) -> Any:
@@ -228,36 +234,34 @@ def _plain(value: Any) -> Any:
 # -- the page ----------------------------------------------------------------------------------------------------------
 
 
-def _render(data: dict[str, Any], presenter: Presenter, reaches: list[dict[str, Any]], people: str = "") -> str:
+def _render(
+    data: dict[str, Any], presenter: Presenter, explanation: Sequence[Mapping[str, Any]], people: str = ""
+) -> str:
     from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
     from legible_envs.overcooked.rendering.palette import PALETTE
 
-    folder = files("benchmarks") / "templates"
-
-    def part(name: str) -> Markup:
-        return Markup((folder / name).read_text(encoding="utf-8"))
-
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters["number"] = _number
-    template = environment.from_string((folder / "report.html.j2").read_text(encoding="utf-8"))
-    return template.render(
+    return environment.from_string(template("report.html.j2")).render(
         title=presenter.title(data),
         lede=_lede(data, presenter),
         figures=_figures(data, presenter),
         palette=PALETTE,
         data=data,
-        words=presenter.words,
-        reaches=reaches,
+        texts=presenter.texts,
+        workspace=presenter.name,
+        rows=_explained(explanation),
+        stages=explains_stages(explanation),
         people=Markup(people),
         best=data["best"],
         settings=_settings(data["config"]),
         created=_date(data["config"].get("created")),
-        style=part("report.css"),
-        icons=part(presenter.icons) if presenter.icons else "",
-        drawing=part(presenter.script),
-        script=part("report.js"),
+        style=Markup(template("report.css")),
+        icons=Markup(presenter.icons()),
+        drawing=Markup(presenter.script()),
+        script=Markup(template("report.js")),
         payload=Markup(_json_for_script(data)),
     )
 
@@ -270,29 +274,29 @@ def _json_for_script(data: dict[str, Any]) -> str:
 
 def _lede(data: dict[str, Any], presenter: Presenter) -> str:
     """What was found, in two sentences."""
-    best, conditions = data["best"], {c["name"].lower(): c for c in data["conditions"]}
-    digits, unit = presenter.words["distance_digits"], presenter.words["distance_unit"]
+    best, panels = data["best"], {panel["name"].lower(): panel for panel in data["panels"]}
+    texts = presenter.texts
 
-    def way(value: Any) -> str:
-        return f"{_number(value, digits)} {unit}"
+    def far(value: Any) -> str:
+        return f"{_number(value, texts.distance_digits)} {texts.distance_unit}".strip()
 
-    score, length = _number(best.get("score")), way(best.get("distance"))
+    score, length = _number(best.get("score")), far(best.get("distance"))
     if data["objective"]["name"] == "efficiency":
-        text = f"The task of the best {presenter.thing} found takes {length} on average; its legibility is {score}."
+        text = f"The task of the best {presenter.noun} found takes {length} on average; its legibility is {score}."
     else:
-        text = f"The best {presenter.thing} found scores {score} in legibility"
+        text = f"The best {presenter.noun} found scores {score} in legibility"
         bounded = data["config"]["workspace"].get("prefix") != "sum"
         if bounded and (best.get("normalised") or -1) > 0:
             text += f", {_number(100 * best['normalised'], 0)} % of the highest conceivable score"
         text += f", and its task takes {length} on average."
-    if "random" in conditions:
-        other = conditions["random"]
-        text += f" A median random one scores {_number(other['score'])} and takes {way(other['distance'])}."
-    if "baseline" in conditions:
-        other = conditions["baseline"]
-        text += f" The sorted baseline scores {_number(other['score'])} and takes {way(other['distance'])}."
+    if "random" in panels:
+        other = panels["random"]
+        text += f" A median random one scores {_number(other['score'])} and takes {far(other['distance'])}."
+    if "baseline" in panels:
+        other = panels["baseline"]
+        text += f" The sorted baseline scores {_number(other['score'])} and takes {far(other['distance'])}."
     cap = data["objective"].get("max_distance")
-    return text if cap is None else f"{text} Layouts above a distance of {way(cap)} were not allowed."
+    return text if cap is None else f"{text} Layouts above a distance of {far(cap)} were not allowed."
 
 
 def _figures(data: dict[str, Any], presenter: Presenter) -> list[tuple[str, str, str]]:
@@ -301,11 +305,19 @@ def _figures(data: dict[str, Any], presenter: Presenter) -> list[tuple[str, str,
     filled, cells = data["archive_size"], math.prod(data["archive_dims"])
     evaluations = result.get("evaluations") or (data["history"].get("evaluations") or [None])[-1]
     single = best.get("single_goal_score")
-    bounded, words = config["workspace"].get("prefix") != "sum", presenter.words
+    bounded, texts = config["workspace"].get("prefix") != "sum", presenter.texts
     return [
-        ("Legibility", _number(best.get("score")), f"{_number(single)} of it from single-goal reaches"),
-        ("Normalised", _number(best.get("normalised")), "of at most 1" if bounded else "per reach"),
-        ("Distance", _number(best.get("distance"), words["distance_digits"]), words["distance"]),
+        (
+            "Legibility",
+            _number(best.get("score")),
+            f"{_number(single)} of it from single-goal reaches" if "single_goal_score" in best else "",
+        ),
+        *(
+            [("Normalised", _number(best["normalised"]), "of at most 1" if bounded else "per reach")]
+            if "normalised" in best
+            else []
+        ),
+        ("Distance", _number(best.get("distance"), texts.distance_digits), texts.distance),
         *([("Mean detour", _number(best["mean_detour"]), "of the straight line")] if "mean_detour" in best else []),
         ("Evaluations", _number(evaluations, 0), f"seed {config.get('seed')}"),
         (

@@ -35,7 +35,7 @@
   // Lightness rises evenly, so equal steps of the score look equal, and the order survives without colour vision.
   const ramp = (t) => `oklch(${(0.3 + 0.62 * t).toFixed(3)} ${(0.1 + 0.05 * Math.sin(Math.PI * t)).toFixed(3)} ${(285 - 185 * t).toFixed(1)})`;
 
-  const place = makePlace(data, { svg, number, plural });
+  const place = makePlace(data, { svg, el, number, plural });
 
   // -- the archive -----------------------------------------------------------------------------------------------------
 
@@ -54,12 +54,13 @@
   const size = { width: margin.left + columnAxis.count * cellWidth + 2, height: margin.top + rowAxis.count * cellHeight + margin.bottom };
   const cellX = (column) => margin.left + column * cellWidth;
   const cellY = (row) => margin.top + (rowAxis.count - 1 - row) * cellHeight;
-  const axisName = (name) => data.words.axes[name] || name;
+  const axisName = (name) => data.texts.axes[name] || name;
   const columnNames = [], rowNames = [];
   let picture, cursor, pinned = cells[0], shown = null;
 
   function drawMap() {
     picture = svg("svg", { viewBox: `0 0 ${size.width} ${size.height}`, "aria-hidden": "true" });
+    picture.style.maxWidth = `${1.6 * size.width}px`; // labels of small archives stay labels
     const inset = Math.min(1, cellWidth / 12);
     const paint = (cell, attributes) => svg("rect", { x: cell.x + inset, y: cell.y + inset, width: cellWidth - 2 * inset, height: cellHeight - 2 * inset, rx: 2, ...attributes });
     for (let row = 0; row < rowAxis.count; row++) {
@@ -127,9 +128,10 @@
     columnNames.forEach((text, i) => text.classList.toggle("on", i === cell.column));
     rowNames.forEach((text, i) => text.classList.toggle("on", i === cell.row));
     $("board").replaceChildren(cell.layout ? place.board(cell.layout) : el("div", { class: "missing" }, "The page carries the drawings of the best cells only; this layout lies in archive.npz."));
-    const obstacles = cell.layout ? place.obstacles(cell.layout) : data.axes[0].name === "obstacles" ? rowAxis.labels[cell.row] : "–";
+    const obstacles = cell.layout && place.obstacles ? place.obstacles(cell.layout) : data.axes[0].name === "obstacles" ? rowAxis.labels[cell.row] : "–";
     const order = place.inWords(columnAxis.labels[cell.column]);
-    const facts = [["Legibility", number(cell.legibility)], ["Distance", number(cell.distance, data.words.distance_digits)], ["Obstacles", String(obstacles)]];
+    const facts = [["Legibility", number(cell.legibility)], ["Distance", number(cell.distance, data.texts.distance_digits)]];
+    if (place.obstacles) facts.push(["Obstacles", String(obstacles)]);
     if (!["legibility", "efficiency"].includes(data.objective.name)) facts.unshift([data.objective.name, number(cell.objective)]);
     else if (hasCosts && data.objective.name === "legibility") facts.push(["Net of costs", number(cell.objective)]);
     $("readout").replaceChildren(el("p", { class: "order" }, (columnAxis.step > 1 ? "near " : "") + order), pairs(facts), el("div", { class: "rank" }, `rank ${number(cell.rank + 1, 0)} of ${number(cells.length, 0)}`));
@@ -203,7 +205,7 @@
     setTimeout(() => URL.revokeObjectURL(link.href), 1000);
   }
 
-  // -- boards side by side ---------------------------------------------------------------------------------------------
+  // -- panels side by side ---------------------------------------------------------------------------------------------
 
   function bar(name, value, [from, to], digits) {
     const position = (v) => Math.max(0, Math.min(100, (v - from) / (to - from || 1) * 100));
@@ -213,13 +215,13 @@
     fill.style.width = Math.max(b - a, 0.8) + "%";
     return el("div", { class: `bar ${name}` }, el("span", {}, name[0].toUpperCase() + name.slice(1)), el("span", { class: "track" }, fill), el("span", {}, number(value, digits)));
   }
-  function drawConditions() {
-    const range = (key) => [Math.min(0, ...data.conditions.map((c) => c[key])), Math.max(0, ...data.conditions.map((c) => c[key]))];
+  function drawPanels() {
+    const range = (key) => [Math.min(0, ...data.panels.map((c) => c[key])), Math.max(0, ...data.panels.map((c) => c[key]))];
     const [scores, distances] = [range("score"), range("distance")];
-    for (const condition of data.conditions) {
-      $("conditions").append(el("figure", {}, place.board(condition.layout, condition.ways),
-        el("figcaption", {}, el("div", { class: "name" }, condition.name[0].toUpperCase() + condition.name.slice(1)), el("p", { class: "note" }, condition.note),
-          bar("legibility", condition.score, scores, 2), bar("distance", condition.distance, distances, data.words.distance_digits), condition.detour === null ? null : bar("detour", condition.detour, [1, Math.max(...data.conditions.map((c) => c.detour), 1.2)], 2))));
+    for (const panel of data.panels) {
+      $("panels").append(el("figure", {}, place.board(panel.layout, panel.paths),
+        el("figcaption", {}, el("div", { class: "name" }, panel.name[0].toUpperCase() + panel.name.slice(1)), el("p", { class: "note" }, panel.note),
+          bar("legibility", panel.score, scores, 2), bar("distance", panel.distance, distances, data.texts.distance_digits), panel.detour === null ? null : bar("detour", panel.detour, [1, Math.max(...data.panels.map((c) => c.detour), 1.2)], 2))));
     }
   }
   function drawBest() {
@@ -229,7 +231,7 @@
       seen.add(cell.column);
       const card = el("button", { type: "button", class: "card", "aria-label": `Show the layout of rank ${cell.rank + 1} on the map` }, place.board(cell.layout));
       card.addEventListener("click", () => { pin(cell); $("map").focus({ preventScroll: true }); $("h-archive").scrollIntoView({ behavior: matchMedia("(prefers-reduced-motion: reduce)").matches ? "auto" : "smooth" }); });
-      $("best").append(el("figure", {}, card, el("figcaption", {}, el("div", { class: "name" }, number(cell.objective)), el("p", { class: "note" }, `${columnAxis.labels[cell.column]} · ${plural(place.obstacles(cell.layout), "obstacle")} · distance ${number(cell.distance, data.words.distance_digits)}`))));
+      $("best").append(el("figure", {}, card, el("figcaption", {}, el("div", { class: "name" }, number(cell.objective)), el("p", { class: "note" }, `${columnAxis.labels[cell.column]}${place.obstacles ? " · " + plural(place.obstacles(cell.layout), "obstacle") : ""} · distance ${number(cell.distance, data.texts.distance_digits)}`))));
     }
   }
 
@@ -326,15 +328,15 @@
       legend.append(key, curve.label, i < curves.length - 1 ? "\u2003" : "");
     });
     const caption = svg("text", { x: frame.left + (frame.width - frame.left) / 2, y: frame.height - 6, "text-anchor": "middle" });
-    caption.textContent = "share of the walk observed →";
+    caption.textContent = "share of the trajectory observed →";
     canvas.append(caption);
-    $("people").append(el("h3", {}, "Goals read correctly"), canvas, legend);
+    $("people").append(el("h3", {}, "Goals predicted correctly"), canvas, legend);
   }
 
   drawMap();
   listen();
   pin(cells[0]);
-  if ($("conditions")) drawConditions();
+  if ($("panels")) drawPanels();
   drawBest();
   if ($("curves")) drawCurves();
   if ($("people")) drawPeople();

@@ -15,31 +15,31 @@ function makePlace(data, { svg, number, plural }) {
   function box([x0, y0, x1, y1], fill, line) {
     return svg("rect", { x: x0, y: up(y1), width: x1 - x0, height: y1 - y0, rx: 12, fill, stroke: line, "stroke-width": 2.5 });
   }
-  function glyph(thing, ink, size) {
-    if (thing.shape === "bin") return svg("rect", { x: -0.38 * thing.size[0], y: -0.38 * thing.size[1], width: 0.76 * thing.size[0], height: 0.76 * thing.size[1], rx: 6, fill: "#0008" });
-    if (thing.shape === "ring") return svg("circle", { r: 0.3 * size, fill: "none", stroke: ink, "stroke-width": 0.16 * size });
-    if (glyphs[thing.shape]) return svg("polygon", { points: glyphs[thing.shape], transform: `scale(${size})`, fill: ink });
+  function glyph(object, ink, size) {
+    if (object.shape === "bin") return svg("rect", { x: -0.38 * object.size[0], y: -0.38 * object.size[1], width: 0.76 * object.size[0], height: 0.76 * object.size[1], rx: 6, fill: "#0008" });
+    if (object.shape === "ring") return svg("circle", { r: 0.3 * size, fill: "none", stroke: ink, "stroke-width": 0.16 * size });
+    if (glyphs[object.shape]) return svg("polygon", { points: glyphs[object.shape], transform: `scale(${size})`, fill: ink });
     const letter = svg("text", { "text-anchor": "middle", y: 0.34 * size, style: `font: 700 ${size}px sans-serif; fill: ${ink}` });
-    letter.textContent = thing.shape[0].toUpperCase();
+    letter.textContent = object.shape[0].toUpperCase();
     return letter;
   }
-  function slot(thing) {
-    const [long, wide] = thing.size;
-    const group = svg("g", { transform: `translate(${thing.slot[0]} ${up(thing.slot[1])}) rotate(${-thing.angle})` },
+  function slot(object) {
+    const [long, wide] = object.size;
+    const group = svg("g", { transform: `translate(${object.slot[0]} ${up(object.slot[1])}) rotate(${-object.angle})` },
       svg("rect", { x: -long / 2 - 2, y: -wide / 2 - 2, width: long + 4, height: wide + 4, rx: 5, fill: colours.slot, stroke: colours.slot_line, "stroke-width": 2 }));
-    const ghost = svg("g", { opacity: 0.38 }, glyph(thing, thing.colour, 0.62 * Math.min(long, wide)));
+    const ghost = svg("g", { opacity: 0.38 }, glyph(object, object.colour, 0.62 * Math.min(long, wide)));
     group.append(ghost);
     return group;
   }
-  function boxOf(thing, x, y) {
-    const [long, wide] = thing.size;
-    const group = svg("g", { transform: `translate(${x} ${up(y)}) rotate(${-thing.angle})` },
-      svg("rect", { x: -long / 2, y: -wide / 2, width: long, height: wide, rx: 0.14 * Math.min(long, wide), fill: thing.colour, stroke: "#1d120a88", "stroke-width": 2 }),
-      glyph(thing, thing.ink, 0.74 * Math.min(long, wide)), svg("title"));
-    group.lastChild.textContent = thing.name;
+  function boxOf(object, x, y) {
+    const [long, wide] = object.size;
+    const group = svg("g", { transform: `translate(${x} ${up(y)}) rotate(${-object.angle})` },
+      svg("rect", { x: -long / 2, y: -wide / 2, width: long, height: wide, rx: 0.14 * Math.min(long, wide), fill: object.colour, stroke: "#1d120a88", "stroke-width": 2 }),
+      glyph(object, object.ink, 0.74 * Math.min(long, wide)), svg("title"));
+    group.lastChild.textContent = object.name;
     return group;
   }
-  function wayOf(points) {
+  function pathOf(points) {
     const group = svg("g", { "stroke-linecap": "round", "stroke-linejoin": "round", fill: "none" });
     group.append(svg("polyline", { points: points.map(([x, y]) => `${x},${up(y)}`).join(" "), stroke: colours.rim, "stroke-width": 11 }));
     points.slice(1).forEach(([x, y], i) => {
@@ -48,13 +48,13 @@ function makePlace(data, { svg, number, plural }) {
     });
     return group;
   }
-  function board(layout, ways = []) {
+  function board(layout, paths = []) {
     const [centres, walls] = split(layout);
     const picture = svg("svg", { viewBox: `-16 -16 ${width + 32} ${depth + 32}`, class: "board table", role: "img", "aria-label": `Table: ${names(layout).join("; ")}; ${plural(walls.length, "virtual obstacle")}.` });
     picture.append(svg("rect", { x: -16, y: -16, width: width + 32, height: depth + 32, rx: 24, fill: colours.rim }), svg("rect", { width, height: depth, rx: 12, fill: colours.top }));
     const pad = [region[0] - 30, region[1] - 30, region[2] + 30, region[3] + 30];
     picture.append(box(pad, colours.region, colours.region_line), box(assembly, colours.assembly, colours.assembly_line));
-    for (const thing of objects) if (thing.slot) picture.append(slot(thing));
+    for (const object of objects) if (object.slot) picture.append(slot(object));
     for (const [x, y] of starts) {
       picture.append(svg("circle", { cx: x, cy: up(y), r: Math.max(hand, 12), fill: "none", stroke: colours.start, "stroke-width": 4 }), svg("circle", { cx: x, cy: up(y), r: 5, fill: colours.start }));
     }
@@ -63,9 +63,9 @@ function makePlace(data, { svg, number, plural }) {
       // Edges lie outside: on a small board they would leave nothing of the cyan.
       picture.append(svg("rect", { x: -long / 2 - 1.2, y: -wide / 2 - 1.2, width: long + 2.4, height: wide + 2.4, fill: colours.obstacle, stroke: colours.obstacle_edge, "stroke-width": 2.4, transform: `translate(${x / 10} ${up(y / 10)}) rotate(${-angle / 100})` }));
     }
-    // Doubt on top: the clearest reaches first.
+    // Ambiguity on top: the clearest reaches first.
     const total = (points) => points.reduce((sum, point) => sum + point[2], 0);
-    for (const way of [...ways].sort((a, b) => total(a) - total(b))) picture.append(wayOf(way));
+    for (const path of [...paths].sort((a, b) => total(a) - total(b))) picture.append(pathOf(path));
     centres.forEach(([x, y], i) => picture.append(boxOf(objects[i], x / 10, y / 10)));
     return picture;
   }
@@ -75,12 +75,12 @@ function makePlace(data, { svg, number, plural }) {
     return JSON.stringify({
       schema: 1,
       table: data.place.table,
-      objects: data.place.things.map((thing, i) => ({ ...thing, at: centres[i].map(metres) })),
+      objects: data.place.boxes.map((box, i) => ({ ...box, at: centres[i].map(metres) })),
       obstacles: walls.map(([x, y, angle]) => ({ at: [metres(x), metres(y)], angle: angle / 18000 * Math.PI, size: obstacle.map((v) => v / 1000) })),
     }, null, 1);
   }
   const obstacles = (layout) => layout.length - objects.length;
-  const initials = new Map(objects.map((thing) => [thing.name.split("-").map((part) => part[0]).join(""), thing.name]));
+  const initials = new Map(objects.map((object) => [object.name.split("-").map((part) => part[0]).join(""), object.name]));
   const inWords = (label) => String(label).split(" ").map((part) => initials.get(part) || part).join(" · ");
 
   return { board, asText, obstacles, inWords };

@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import gymnasium as gym
 import numpy as np
@@ -19,7 +19,10 @@ from legible_envs.overcooked.layout import INGREDIENTS, OvercookedLayout
 from legible_envs.overcooked.recipes import PAPER_SOUPS, Recipe, check_recipes
 from legible_envs.support.files import write_npz
 
-__all__ = ["Played", "load_played", "play", "recipes_for"]
+if TYPE_CHECKING:
+    from legible_envs.rollouts.trajectory import Trajectory
+
+__all__ = ["Played", "load_played", "play", "read_played", "recipes_for"]
 
 ENV_ID: Final = "LegibleOvercooked-v0"
 STAY: Final = 4
@@ -108,6 +111,22 @@ def load_played(path: str | os.PathLike[str]) -> Played:
         raise
     except Exception as error:
         raise ValueError(f"{os.fspath(path)} is no recorded play: {error}") from error
+
+
+def read_played(path: Path) -> list[Trajectory] | None:
+    """The trajectories in recorded play, its participant named like the file; None where the file is something else.
+
+    Raises:
+        OSError: No such file.
+        ValueError: The recording belongs to another version of the game.
+    """
+    from legible_envs.overcooked.trajectories import trajectories_from_played
+
+    try:
+        played = load_played(path)
+    except ValueError:
+        return None
+    return trajectories_from_played(played, participant=path.stem)
 
 
 def recipes_for(layout: OvercookedLayout) -> tuple[Recipe, ...]:

@@ -1,9 +1,9 @@
-"""Rollouts and trajectories: what they are, how they are recorded, and the files they are kept in (npz, CSV, Minari).
+"""Rollouts and trajectories: what they are, how they are recorded, and the files that keep them (npz, CSV, Minari).
 
 >>> from legible_envs.rollouts import RecordTrajectories, write_csv
 >>> env = RecordTrajectories(gym.make("LegibleOvercooked-v0"))      # doctest: +SKIP
 >>> gymnasium.utils.play.play(env)                              # doctest: +SKIP
->>> write_csv("walks.csv", env.trajectories(participant="p1"))  # doctest: +SKIP
+>>> write_csv("reaches.csv", env.trajectories(participant="p1"))  # doctest: +SKIP
 """
 
 import lazy_loader as lazy

@@ -1,8 +1,8 @@
 from .csv_files import read_csv, write_csv
 from .minari_files import to_minari
-from .reading import read_any
+from .reading import TrajectoryFormat, read_any, register_trajectory_format
 from .recording import Episode, RecordTrajectories, record_episode
-from .trajectory import CUTS, Cut, Trajectory, load_trajectories, save_trajectories, trajectories_from_rollout
+from .trajectory import CUTS, Cut, Trajectory, load_trajectories, save_trajectories
 
 __all__ = [
     "CUTS",
@@ -10,12 +10,13 @@ __all__ = [
     "Episode",
     "RecordTrajectories",
     "Trajectory",
+    "TrajectoryFormat",
     "load_trajectories",
     "read_any",
     "read_csv",
     "record_episode",
+    "register_trajectory_format",
     "save_trajectories",
     "to_minari",
-    "trajectories_from_rollout",
     "write_csv",
 ]

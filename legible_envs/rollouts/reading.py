@@ -1,45 +1,66 @@
-"""Trajectories from whatever file they are in."""
+"""Trajectories from any file that holds some.
+
+Formats of recordings beside ``.npz`` and CSV are plug-ins: functions ``read(path)`` that return the trajectories of a
+file, or None where the file is in another format. Recorded play of the kitchen is the one built in.
+"""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any, Final
 
 from legible_envs.rollouts.trajectory import Trajectory, load_trajectories
+from legible_envs.support.plugins import Registry
 
-if TYPE_CHECKING:
-    from legible_envs.overcooked.layout import OvercookedLayout
-    from legible_envs.tabletop.layout import TabletopLayout
+__all__ = ["TrajectoryFormat", "read_any", "register_trajectory_format"]
 
-__all__ = ["read_any"]
+TrajectoryFormat = Callable[[Path], list[Trajectory] | None]
+
+_registry: Final = Registry(
+    "trajectory format",
+    "legible.trajectories",
+    {"recorded play": "legible_envs.overcooked.human_play:read_played"},
+    ValueError,
+)
 
 
-def read_any(
-    path: str | os.PathLike[str], *, layout: OvercookedLayout | TabletopLayout | None = None
-) -> list[Trajectory]:
-    """Trajectories of an ``.npz`` of :func:`~legible_envs.rollouts.save_trajectories`, a CSV, or a recorded play.
+def register_trajectory_format(name: str, read: TrajectoryFormat, *, overwrite: bool = False) -> None:
+    """Let :func:`read_any` read another format, for the rest of this process.
+
+    Args:
+        name: What the format is called.
+        read: Called with a path; returns the trajectories in the file, or None where it has another format.
+        overwrite: Whether it may replace an earlier registration of that name.
+
+    Raises:
+        ValueError: The name is taken, or ``read`` cannot be called.
+    """
+    _registry.register(name, read, overwrite=overwrite)
+
+
+def read_any(path: str | os.PathLike[str], *, layout: Any = None) -> list[Trajectory]:
+    """Trajectories of an ``.npz`` of :func:`~legible_envs.rollouts.save_trajectories`, a CSV, or recorded play.
 
     Args:
         path: The file; ``.csv`` is read as CSV, others by what is in them.
-        layout: Kitchen or table of CSV trajectories that name none.
+        layout: The layout of CSV trajectories that name none.
 
     Raises:
         OSError: The file cannot be read.
         ValueError: It holds no trajectories; what is wrong with it.
     """
-    if Path(path).suffix.lower() == ".csv":
+    path = Path(path)
+    if path.suffix.lower() == ".csv":
         from legible_envs.rollouts.csv_files import read_csv
 
         return read_csv(path, layout=layout)
     try:
         return load_trajectories(path)
-    except ValueError as error:
-        from legible_envs.overcooked.human_play import load_played
-        from legible_envs.overcooked.trajectories import trajectories_from_played
-
-        try:
-            played = load_played(path)
-        except ValueError:
-            raise error from None
-        return trajectories_from_played(played, participant=Path(path).stem)
+    except ValueError:
+        for name in _registry.list():
+            found = _registry.resolve(name)(path)
+            if found is not None:
+                return list(found)
+        raise

@@ -1,4 +1,4 @@
-"""Trajectories: one person's way from one start to one goal, how a prefix of it is cut, and the files they are kept in.
+"""Trajectories: one person's motion from one start to one goal, how a prefix of it is cut, and the files that keep it.
 
 A *rollout* is one recorded or simulated episode; a *trajectory* is the part of it from a start to a goal, with what an
 observer may know beforehand: where the person started, and which goals are possible.
@@ -18,10 +18,7 @@ import numpy.typing as npt
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from legible_envs.overcooked.layout import OvercookedLayout
-    from legible_envs.tabletop.layout import TabletopLayout
-
-__all__ = ["CUTS", "Cut", "Trajectory", "load_trajectories", "save_trajectories", "trajectories_from_rollout"]
+__all__ = ["CUTS", "Cut", "Trajectory", "load_trajectories", "save_trajectories"]
 
 Cut = Literal["steps", "cells", "time", "arc"]
 CandidateSet = Literal["task", "game", "all"]
@@ -40,33 +37,33 @@ _SLACK: Final = 1e-9
 
 @dataclass(frozen=True, eq=False, init=False)
 class Trajectory:
-    """One way from a start to a goal. Immutable, compared by content.
+    """One person's motion from a start to a goal. Immutable, compared by content.
 
-    On a grid the person walks from station to station: ``states`` are the floor cells, consecutive repeats dropped,
-    and the goal station's own cell as the last node, ``(row, col)`` each. Elsewhere they are positions in metres.
+    On a grid ``states`` are the floor cells, consecutive repeats dropped, and the goal's own cell as the last node,
+    ``(row, col)`` each. Elsewhere they are positions in metres.
 
     Attributes:
         states: ``(T, d)`` cells (integers) or positions (floats, finite). May be empty: nothing observed yet.
         times: ``(T,)`` seconds, never decreasing; on a grid the time of arrival. None counts 0, 1, 2, ….
-        start: Name of where the person came from.
+        start: Name of the place the person came from.
         goal: Name of the goal reached; None where it is not known.
         candidates: Goals that were possible, each once; the order does not matter and is kept.
-        participant: Who.
-        condition: Under which condition.
-        layout: The kitchen or the table it happened at, if any.
-        layout_name: Its name, if it has one.
+        participant: Name of the person.
+        condition: Name of the experimental condition.
+        layout: The layout it happened in, if any: a value of a registered kind (:mod:`legible_envs.layout_kinds`).
+        layout_name: Name of the layout, if it has one.
         candidate_set: Where ``candidates`` come from: valid by precedence (``"task"``), valid in the running game
             (``"game"``), or all goals of that kind in reach (``"all"``).
         complete: Whether the last state is the goal's own; False for a prefix.
-        goal_positions: Where each of ``candidates`` is, in their order and the frame of ``states``; None where the
-            layout tells or nobody knows.
+        goal_positions: The position of each of ``candidates``, in their order and the frame of ``states``; None where
+            the layout tells it or it is not known.
 
     Raises:
         ValueError: Wrong shapes, NaN, times that run backwards, no or repeated candidates, a goal that is not one.
 
     Example:
-        >>> walk = Trajectory([(1, 1), (1, 2), (0, 2)], goal="pot", candidates=("pot", "onion"))
-        >>> walk.prefix(0.5).states.tolist()
+        >>> trajectory = Trajectory([(1, 1), (1, 2), (0, 2)], goal="pot", candidates=("pot", "onion"))
+        >>> trajectory.prefix(0.5).states.tolist()
         [[1, 1], [1, 2]]
     """
 
@@ -77,7 +74,7 @@ class Trajectory:
     candidates: tuple[str, ...]
     participant: str
     condition: str
-    layout: OvercookedLayout | TabletopLayout | None
+    layout: Any
     layout_name: str
     candidate_set: CandidateSet
     complete: bool
@@ -92,7 +89,7 @@ class Trajectory:
         candidates: Sequence[str] = (),
         participant: str = "",
         condition: str = "",
-        layout: OvercookedLayout | TabletopLayout | None = None,
+        layout: Any = None,
         layout_name: str = "",
         candidate_set: CandidateSet = "all",
         complete: bool = True,
@@ -184,7 +181,7 @@ class Trajectory:
 
     @cached_property
     def arc_lengths(self) -> npt.NDArray[np.float64]:
-        """``(T,)`` way covered until each state: steps on a grid (Manhattan), Euclidean elsewhere."""
+        """``(T,)`` path length until each state: steps on a grid (Manhattan), Euclidean elsewhere."""
         steps = np.diff(self.states.astype(np.float64), axis=0)
         lengths = np.abs(steps).sum(axis=1) if self.is_grid else np.sqrt((steps**2).sum(axis=1))
         return np.concatenate([np.zeros(min(len(self.states), 1)), np.cumsum(lengths)])
@@ -257,21 +254,21 @@ def _checked_times(times: npt.ArrayLike | None, count: int) -> npt.NDArray[np.fl
 # -- cuts -------------------------------------------------------------------------------------------------------------
 
 
-def _cut_steps(walk: Trajectory, fraction: float) -> int:
-    return min(max(round(fraction * len(walk.states)), 1), len(walk.states) - 1)
+def _cut_steps(whole: Trajectory, fraction: float) -> int:
+    return min(max(round(fraction * len(whole.states)), 1), len(whole.states) - 1)
 
 
-def _cut_cells(walk: Trajectory, fraction: float) -> int:
-    return int(np.floor(fraction * (len(walk.states) - 2) + _SLACK)) + 1
+def _cut_cells(whole: Trajectory, fraction: float) -> int:
+    return int(np.floor(fraction * (len(whole.states) - 2) + _SLACK)) + 1
 
 
-def _cut_time(walk: Trajectory, fraction: float) -> int:
-    first, last = walk.times[0], walk.times[-1]
-    return _count_up_to(walk.times - first, fraction * (last - first))
+def _cut_time(whole: Trajectory, fraction: float) -> int:
+    first, last = whole.times[0], whole.times[-1]
+    return _count_up_to(whole.times - first, fraction * (last - first))
 
 
-def _cut_arc(walk: Trajectory, fraction: float) -> int:
-    return _count_up_to(walk.arc_lengths, fraction * walk.arc_lengths[-1])
+def _cut_arc(whole: Trajectory, fraction: float) -> int:
+    return _count_up_to(whole.arc_lengths, fraction * whole.arc_lengths[-1])
 
 
 def _count_up_to(values: npt.NDArray[np.float64], limit: float) -> int:
@@ -296,8 +293,8 @@ def save_trajectories(path: str | os.PathLike[str], trajectories: Iterable[Traje
         The path written.
 
     Raises:
-        ValueError: Cells and positions, or different dimensions, in one file.
-        OSError: The file cannot be written; what was there before is untouched.
+        ValueError: Cells and positions, or different dimensions, in one file; a layout of no registered kind.
+        OSError: The file cannot be written; an earlier file is untouched.
     """
     from legible_envs.rollouts.npz_files import write
 
@@ -309,18 +306,8 @@ def load_trajectories(path: str | os.PathLike[str]) -> list[Trajectory]:
 
     Raises:
         FileNotFoundError: No such file.
-        ValueError: Not a file of trajectories, damaged, or of a newer schema.
+        ValueError: Not a file of trajectories, damaged, of a newer schema, or with layouts of a kind that is not known.
     """
     from legible_envs.rollouts.npz_files import read
 
     return read(path)
-
-
-def trajectories_from_rollout(views: Sequence[Any], **options: Any) -> list[Trajectory]:
-    """The walks in an episode of the kitchen, from the views of its states in order.
-
-    See :func:`legible_envs.overcooked.trajectories.trajectories_from_views`, which this calls, for the options.
-    """
-    from legible_envs.overcooked.trajectories import trajectories_from_views
-
-    return trajectories_from_views(views, **options)

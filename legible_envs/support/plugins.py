@@ -1,4 +1,4 @@
-"""Finding what others plug in: by registered name, by an installed package's entry point, or as ``module:Class``."""
+"""Plug-ins of other packages: found by registered name, by an entry point, or as ``module:Class``."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ __all__ = ["Plugin", "Registry", "target_of"]
 
 @dataclass(frozen=True, slots=True)
 class Plugin:
-    """Something that can be used by name.
+    """A plug-in that can be used by name.
 
     Attributes:
         name: What to call it by.
         origin: ``"built in"``, ``"registered"``, or ``"entry point of PACKAGE VERSION"``.
         target: Where it is defined, ``module:Name``.
-        factory: The object itself where it was registered, else None.
+        factory: The plug-in itself where it was registered, else None.
     """
 
     name: str
     origin: str
     target: str
-    factory: Callable[..., Any] | None = None
+    factory: Any = None
 
     def summary(self) -> str:
         """First line of its documentation; imports it. Says why where it cannot be imported."""
@@ -44,25 +44,39 @@ class Registry:
         kind: What a plug-in is, for messages: ``"emitter"``.
         group: Entry point group of installed plug-ins.
         built_in: ``{name: "module:Name"}`` of those that come with the project.
-        error: Exception raised for everything that is wrong.
+        error: Makes the exception raised for everything that is wrong, from its message.
+        accepts: The class whose instances are plug-ins; None means that plug-ins are classes or functions.
     """
 
-    def __init__(self, kind: str, group: str, built_in: Mapping[str, str], error: type[Exception]) -> None:
+    def __init__(
+        self,
+        kind: str,
+        group: str,
+        built_in: Mapping[str, str],
+        error: Callable[[str], Exception],
+        *,
+        accepts: type | None = None,
+    ) -> None:
         self.kind = kind
         self.group = group
         self.error = error
+        self.accepts = accepts
         self._built_in = dict(built_in)
-        self._registered: dict[str, Callable[..., Any]] = {}
+        self._registered: dict[str, Any] = {}
 
-    def register(self, name: str, factory: Callable[..., Any], *, overwrite: bool = False) -> None:
+    def _fits(self, plugin: object) -> bool:
+        return callable(plugin) if self.accepts is None else isinstance(plugin, self.accepts)
+
+    def register(self, name: str, factory: Any, *, overwrite: bool = False) -> None:
         """Make a plug-in available by name for the rest of this process.
 
         Built-in names are never replaced, others only with ``overwrite``.
         """
         if not isinstance(name, str) or not name or ":" in name:
             raise self.error(f"the name of a {self.kind} must be a non-empty string without ':', got {name!r}")
-        if not callable(factory):
-            raise self.error(f"{self.kind} {name!r}: the factory must be callable, got {type(factory).__name__}")
+        if not self._fits(factory):
+            expected = "callable" if self.accepts is None else f"a {self.accepts.__name__}"
+            raise self.error(f"{self.kind} {name!r}: the factory must be {expected}, got {type(factory).__name__}")
         if name in self._built_in:
             raise self.error(f"the {self.kind} name {name!r} is built in; choose another")
         if name in self._registered and not overwrite:
@@ -79,10 +93,10 @@ class Registry:
             found[name] = Plugin(name, "registered", target_of(factory), factory)
         return found
 
-    def resolve(self, spec: str | Callable[..., Any]) -> Callable[..., Any]:
-        """Find a factory by name or ``"module:Name"``, or return the callable given."""
+    def resolve(self, spec: Any) -> Any:
+        """Find a plug-in by name or ``"module:Name"``, or return the plug-in given."""
         if not isinstance(spec, str):
-            if callable(spec):
+            if self._fits(spec):
                 return spec
             raise self.error(f"a {self.kind} is a name, 'module:Class' or a callable, got {type(spec).__name__}")
         if spec in self._registered:
@@ -99,9 +113,10 @@ class Registry:
         except (ImportError, AttributeError, ValueError) as error:
             where = "" if spec == target else f" ({target})"
             raise self.error(f"{self.kind} {spec!r}{where} cannot be imported: {error}") from error
-        if not callable(found):
-            raise self.error(f"{self.kind} {spec!r} is not a class or function but a {type(found).__name__}")
-        return found  # type: ignore[no-any-return]
+        if not self._fits(found):
+            expected = "class or function" if self.accepts is None else self.accepts.__name__
+            raise self.error(f"{self.kind} {spec!r} is not a {expected} but a {type(found).__name__}")
+        return found
 
     def _installed(self) -> dict[str, EntryPoint]:
         return {point.name: point for point in entry_points(group=self.group)}

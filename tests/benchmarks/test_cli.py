@@ -9,11 +9,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import click
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
-from benchmarks.cli.app import main
+from benchmarks.cli.app import CONTENTS, main
 from benchmarks.presenters.overcooked import load_kitchen
 from legible_envs import __version__
 from legible_envs.overcooked import OvercookedLayout, OvercookedWorkspace
@@ -248,7 +249,7 @@ def test_traceback_on_request(tmp_path: Path) -> None:
     assert isinstance(result.exception, FileNotFoundError)
 
 
-def test_score_reads_recorded_walks_of_the_kitchen(tmp_path: Path) -> None:
+def test_score_predicts_recorded_trajectories_of_the_kitchen(tmp_path: Path) -> None:
     from legible_envs.overcooked import OvercookedLayout
     from legible_envs.rollouts import Trajectory, save_trajectories
     from predictors import BayesianGoalPredictor
@@ -260,7 +261,7 @@ def test_score_reads_recorded_walks_of_the_kitchen(tmp_path: Path) -> None:
     save_trajectories(tmp_path / "walks.npz", [walk, away, walk])
     result = legible("score", "-", "--trajectories", tmp_path / "walks.npz", text=KITCHEN)
     assert result.exit_code == 0, result.output
-    assert "2 walks" in result.output
+    assert "2 trajectories" in result.output
     expected = BayesianGoalPredictor().fit([walk]).score([walk], fractions=(0.5,))
     row = next(line for line in result.output.splitlines() if line.strip().startswith("Eq. 1")).split()
     assert float(row[4]) == pytest.approx(expected, abs=1e-3)
@@ -286,7 +287,7 @@ def walks_of_run(run: Path, tmp_path: Path) -> Path:
     return write_csv(tmp_path / "walks.csv", walks)
 
 
-def test_score_judges_predictors_and_reports_them(run: Path, walks_of_run: Path) -> None:
+def test_score_evaluates_predictors_and_reports_them(run: Path, walks_of_run: Path) -> None:
     import json
 
     import pandas as pd
@@ -386,12 +387,22 @@ def test_trajectories_of_another_kitchen_are_refused(tmp_path: Path) -> None:
 # -- the command itself ------------------------------------------------------------------------------------------------
 
 
-def test_help_names_every_command() -> None:
+def test_help_is_a_table_of_contents_of_every_command() -> None:
     result = legible("--help")
     assert result.exit_code == 0
-    for command in ("optimize", "score", "show", "play", "humans", "bench", "emitters", "demo", "report"):
-        assert command in result.output
-        assert legible(command, "--help").exit_code == 0
+    lines = result.output.splitlines()
+    named = [name for names in CONTENTS.values() for name in names]
+    assert {name.split()[0] for name in named} == set(main.commands)
+    humans = main.commands["humans"]
+    assert isinstance(humans, click.Group)
+    assert {name.split()[1] for name in named if " " in name} == set(humans.commands)
+    for title, names in CONTENTS.items():
+        start = lines.index(f"{title}:")
+        for row, name in zip(lines[start + 1 :], names, strict=False):
+            assert row.strip().startswith(name)
+            assert row.rstrip().endswith("."), "one line each"
+    for name in named:
+        assert legible(*name.split(), "--help").exit_code == 0
 
 
 def test_version() -> None:

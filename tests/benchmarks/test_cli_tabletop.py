@@ -1,4 +1,4 @@
-"""The command line on tables: searches of every condition, boards, scores, and bad input in one line."""
+"""The command line on tables: searches of every condition, panels, scores, and bad input in one line."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from click.testing import CliRunner, Result
 from PIL import Image
 
 from benchmarks.cli.app import main
-from benchmarks.presenters.tabletop_panels import CONDITIONS, boards_of
+from benchmarks.presenters.tabletop_panels import CONDITIONS, panels_of
 from legible_envs.tabletop import TabletopLayout, TabletopTask, VirtualObstacle
 from legible_envs.tabletop.design.workspace import TabletopWorkspace
 from legible_envs.tabletop.scoring.scorer import TabletopScorer
@@ -64,7 +64,7 @@ def test_every_condition_is_a_whole_run(run: Path) -> None:
     assert TabletopLayout.from_json(run / "obstacles" / "best.json").objects == baseline.objects
 
 
-def test_show_draws_the_four_boards_and_the_desired_configuration(run: Path, tmp_path: Path) -> None:
+def test_show_draws_the_four_panels_and_the_desired_configuration(run: Path, tmp_path: Path) -> None:
     (run / "boards.png").unlink()
     result = legible("show", run)
     assert result.exit_code == 0, result.output
@@ -72,7 +72,7 @@ def test_show_draws_the_four_boards_and_the_desired_configuration(run: Path, tmp
         width, height = image.size
     assert width > height > 600
     titles = ["Baseline", "Placement Optimized", "Virtual Obstacle Optimized", "Both Optimized"]
-    assert [c.name for c in boards_of(load_run(run))] == titles
+    assert [c.name for c in panels_of(load_run(run))] == titles
     for title in titles:
         assert title in result.output
     elsewhere = legible("show", run, "--out", tmp_path / "figure.png")
@@ -80,8 +80,8 @@ def test_show_draws_the_four_boards_and_the_desired_configuration(run: Path, tmp
     assert (tmp_path / "figure.png").read_bytes() == (run / "boards.png").read_bytes()
 
 
-def test_boards_are_the_layouts_of_the_runs_with_their_scores(run: Path) -> None:
-    found = {c.name: c for c in boards_of(load_run(run))}
+def test_panels_are_the_layouts_of_the_runs_with_their_scores(run: Path) -> None:
+    found = {c.name: c for c in panels_of(load_run(run))}
     for condition, title in CONDITIONS.items():
         folder = run if condition == "both" else run / condition
         assert found[title].layout == TabletopLayout.from_json(folder / "best.json")
@@ -93,7 +93,7 @@ def test_boards_are_the_layouts_of_the_runs_with_their_scores(run: Path) -> None
     assert found["Baseline"].score == pytest.approx(TabletopScorer().score_layout(found["Baseline"].layout)["score"])
 
 
-def test_the_report_shows_map_boards_and_reaches(run: Path) -> None:
+def test_the_report_shows_map_panels_and_reaches(run: Path) -> None:
     data, source = page_data(run), load_run(run)
     assert len(data["cells"]) == data["archive_size"] == len(source.elites())
     genome = source.elites().solution[0]
@@ -101,8 +101,8 @@ def test_the_report_shows_map_boards_and_reaches(run: Path) -> None:
     drawn = np.array(data["cells"][0][5][: len(layout.objects)]) / 1e4
     np.testing.assert_allclose(drawn, layout.centres, atol=1e-4)
     assert len(data["cells"][0][5]) == len(layout.objects) + len(layout.obstacles)
-    assert [c["name"] for c in data["conditions"]] == ["Baseline", *CONDITIONS.values()]
-    assert all(c["ways"] for c in data["conditions"])
+    assert [c["name"] for c in data["panels"]] == ["Baseline", *CONDITIONS.values()]
+    assert all(c["paths"] for c in data["panels"])
     assert data["axes"][1]["labels"] == list(source.workspace.order_names)
     assert data["axes"][0]["labels"][0] == "0.080"
     text = (run / "report.html").read_text(encoding="utf-8")
@@ -125,7 +125,7 @@ def test_resume_goes_on_with_every_condition(run: Path, tmp_path: Path) -> None:
     out = tmp_path / "run"
     shutil.copytree(run, out)
     shutil.rmtree(out / "obstacles")  # as if interrupted before the last one
-    assert [c.name for c in boards_of(load_run(out))] == ["Baseline", "Placement Optimized", "Both Optimized"]
+    assert [c.name for c in panels_of(load_run(out))] == ["Baseline", "Placement Optimized", "Both Optimized"]
     result = legible("optimize", "tabletop", "--resume", "--quiet", "--out", out)
     assert result.exit_code == 0, result.output
     for folder in ("obstacles", "placement", "."):
@@ -147,7 +147,7 @@ def test_one_condition_of_another_task_by_the_papers_budget(run: Path, tmp_path:
     result = legible(*one, "--iterations", 20, 3)
     assert result.exit_code == 0, result.output
     assert not (out / "conditions.json").exists()
-    assert [c.name for c in boards_of(load_run(out))] == ["Baseline", "Placement Optimized"]
+    assert [c.name for c in panels_of(load_run(out))] == ["Baseline", "Placement Optimized"]
     assert json.loads((out / "config.json").read_text())["iterations"] == [20, 3]
     again = legible("optimize", "tabletop", "--resume", "--quiet", "--out", out)
     assert again.exit_code == 0, again.output
@@ -203,7 +203,7 @@ def test_show_draws_a_table_of_characters(run: Path) -> None:
         assert mark in result.output
 
 
-def test_recorded_reaches_are_read(run: Path, tmp_path: Path) -> None:
+def test_goals_of_recorded_reaches_are_predicted(run: Path, tmp_path: Path) -> None:
     from legible_envs.rollouts import save_trajectories
     from legible_envs.tabletop.humans import sample_person, simulate_task
 

@@ -11,19 +11,11 @@ import pandas as pd
 import pytest
 from rich.console import Console
 
-from benchmarks.cli.demo import RANDOM_LAYOUTS, conditions, recorded_play, run_demo
-from legible_envs.datasets.overcooked_2019 import RecordingsError, load_recorded_games
+from benchmarks.cli.demo import RANDOM_LAYOUTS, make_panels, recorded_play, run_demo
+from legible_envs.datasets.overcooked_2019 import RecordingsError
 from legible_envs.overcooked import OvercookedLayout, OvercookedWorkspace
 
 TINY = {"shape": (5, 5), "evaluations": 3000, "efficient_evaluations": 2000}
-
-
-def have_recordings() -> bool:
-    try:
-        load_recorded_games(layouts=())
-    except RecordingsError:
-        return False
-    return True
 
 
 def run_it(folder: Path, **settings: object) -> str:
@@ -50,7 +42,7 @@ def test_it_leaves_everything_a_user_was_promised(demo: tuple[Path, str]) -> Non
     assert workspace.legibility(workspace.encode(best)) == pytest.approx(config["result"]["best_objective"])
 
 
-def test_it_prints_boards_scores_and_where_the_report_is(demo: tuple[Path, str]) -> None:
+def test_it_prints_panels_scores_and_where_the_report_is(demo: tuple[Path, str]) -> None:
     folder, text = demo
     config = json.loads((folder / "config.json").read_text())
     row = next(line for line in text.splitlines() if line.startswith("random"))
@@ -61,29 +53,29 @@ def test_it_prints_boards_scores_and_where_the_report_is(demo: tuple[Path, str])
     assert "Recorded play was left out" in text, "one line says what is missing"
 
 
-def test_the_report_compares_the_three_conditions(demo: tuple[Path, str]) -> None:
+def test_the_report_compares_the_three_panels(demo: tuple[Path, str]) -> None:
     page = (demo[0] / "report.html").read_text()
     start = page.index(">", page.index('id="data"')) + 1
     data = json.loads(page[start : page.index("</script>", start)])
-    assert [c["name"] for c in data["conditions"]] == ["random", "efficient", "legible"]
+    assert [c["name"] for c in data["panels"]] == ["random", "efficient", "legible"]
     assert data["recorded_play"]["curves"] == []
 
 
-def test_conditions_are_what_they_say() -> None:
+def test_panels_are_what_they_say() -> None:
     workspace = OvercookedWorkspace(shape=(5, 5))
     rng = np.random.default_rng(0)
     best = workspace.sample(1, rng)[0]
-    random, efficient, legible = conditions(workspace, best, seed=3, evaluations=3000)
+    random, efficient, legible = make_panels(workspace, best, seed=3, evaluations=3000)
     drawn = workspace.sample(RANDOM_LAYOUTS, np.random.default_rng(3))
     scores = workspace.legibility(drawn)
     assert random.score in scores or np.isclose(scores, random.score).any()
     assert (scores < random.score - 1e-9).mean() <= 0.5 <= (scores <= random.score + 1e-9).mean()
     assert efficient.distance <= workspace.distance(drawn).min()
     assert legible.layout == workspace.decode(best)
-    for condition in (random, efficient, legible):
-        genome = workspace.encode(condition.layout)
-        assert condition.score == pytest.approx(workspace.legibility(genome))
-        assert condition.distance == pytest.approx(workspace.distance(genome))
+    for panel in (random, efficient, legible):
+        genome = workspace.encode(panel.layout)
+        assert panel.score == pytest.approx(workspace.legibility(genome))
+        assert panel.distance == pytest.approx(workspace.distance(genome))
 
 
 def test_it_replaces_an_earlier_demonstration(demo: tuple[Path, str], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -104,7 +96,6 @@ def test_no_network_is_one_line_not_an_error(monkeypatch: pytest.MonkeyPatch, tm
 
 
 @pytest.mark.data
-@pytest.mark.skipif(not have_recordings(), reason="the recorded games are not here: legible humans fetch")
 def test_recorded_play_agrees_with_every_walk_scored_by_itself() -> None:
     from benchmarks.experiments.prediction.run import score_every_trajectory
     from benchmarks.experiments.prediction.sweep import UNTRAINED
@@ -117,7 +108,8 @@ def test_recorded_play_agrees_with_every_walk_scored_by_itself() -> None:
             assert value == pytest.approx(own[np.isclose(own["fraction"], fraction)]["correct"].mean())
     table = pd.DataFrame(summary["table"]["rows"], columns=summary["table"]["columns"])
     assert (
-        table["walks"].sum() == walks["trajectory"].groupby([walks["layout"], walks["predictor"]]).nunique().sum() / 2
+        table["trajectories"].sum()
+        == walks["trajectory"].groupby([walks["layout"], walks["predictor"]]).nunique().sum() / 2
     )
     for _, row in table.iterrows():
         own = walks[(walks["layout"] == row["kitchen"].replace(" ", "_")) & (walks["predictor"] == "Eq. 1")]

@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from rich.console import Console
 
 from benchmarks.cli.app import main
-from benchmarks.cli.humans import judge_people
+from benchmarks.cli.humans import evaluate_predictors
 from benchmarks.experiments.prediction import run
 from benchmarks.experiments.prediction.analysis import reference_rows, to_markdown
 from benchmarks.experiments.prediction.sweep import (
@@ -101,11 +101,11 @@ def test_the_command_prints_and_writes_tables(tmp_path: Path, monkeypatch: pytes
     asked = evaluated(monkeypatch)
     (tmp_path / "data.csv").touch()
     stream = io.StringIO()
-    judge_people(
+    evaluate_predictors(
         Console(file=stream, width=140), pointing=tmp_path / "data.csv", neural=False, repeats=2, out=tmp_path / "out"
     )
     assert asked == [Experiment(repeats=2)]
-    for text in ("0.350 (\u22120.028)", "0.800 (+0.002)", "random3 1,200 walks", "so many cells"):
+    for text in ("0.350 (\u22120.028)", "0.800 (+0.002)", "random3 1,200 trajectories", "so many cells"):
         assert text in stream.getvalue()
     assert "| GRU | 0.800 (+0.002) | 1 |" in (tmp_path / "out" / "pointing.md").read_text(encoding="utf-8")
     assert pd.read_csv(tmp_path / "out" / "kitchens.csv")["mean"].tolist() == [0.35, 0.5]
@@ -115,19 +115,19 @@ def test_networks_are_evaluated_where_torch_is_installed(monkeypatch: pytest.Mon
     asked = evaluated(monkeypatch)
     monkeypatch.setattr(training, "require_torch", lambda: None)
     stream = io.StringIO()
-    judge_people(Console(file=stream, width=140), layouts=("random3",))
+    evaluate_predictors(Console(file=stream, width=140), layouts=("random3",))
     assert asked == [Experiment(predictors=(*PREDICTORS, *NEURAL), layouts=("random3",))]
-    assert "pointing was not judged: --pointing" in stream.getvalue()
+    assert "pointing was not evaluated: --pointing" in stream.getvalue()
     monkeypatch.setattr(training, "require_torch", without_torch)
-    judge_people(Console(file=stream, width=140))
+    evaluate_predictors(Console(file=stream, width=140))
     assert asked[1] == Experiment(layouts=LAYOUTS)
-    assert "Networks were not judged: training needs PyTorch" in stream.getvalue()
-    wanted = CliRunner().invoke(main, ["humans", "judge", "--neural"])
+    assert "Networks were not evaluated: training needs PyTorch" in stream.getvalue()
+    wanted = CliRunner().invoke(main, ["humans", "evaluate", "--neural"])
     assert (wanted.exit_code, len(asked)) == (2, 2)
     assert "needs PyTorch" in wanted.output
-    unknown = CliRunner().invoke(main, ["humans", "judge", "--layout", "random0"])
+    unknown = CliRunner().invoke(main, ["humans", "evaluate", "--layout", "random0"])
     assert unknown.exit_code == 2
-    assert "no walks are recorded in ['random0']" in unknown.output
+    assert "no trajectories are recorded in ['random0']" in unknown.output
 
 
 def test_pointing_is_trimmed_resampled_and_starts_nowhere(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.presenters.base import Condition
+from benchmarks.presenters.base import Panel
 from benchmarks.reports.search_report import MAX_LAYOUTS, write_best_image, write_report
 from legible_envs.overcooked import OvercookedLayout, OvercookedWorkspace
 from optimizers import SearchError, load_run
@@ -124,15 +124,15 @@ def test_hostile_text_cannot_leave_its_place(tmp_path: Path, workspace: Overcook
     evil = "</script><img src=x onerror=alert(1)><!--"
     write_run(tmp_path, workspace, 5, platform=evil)
     layout = load_run(tmp_path).best_layout
-    page = page_of(tmp_path, conditions=[Condition(evil, layout, 1.0, 2.0, note=evil)], recorded_play={"note": evil})
-    assert page.data["conditions"][0]["name"] == evil
+    page = page_of(tmp_path, panels=[Panel(evil, layout, 1.0, 2.0, note=evil)], recorded_play={"note": evil})
+    assert page.data["panels"][0]["name"] == evil
     assert not [a for t, a in page.elements if t == "img"]
 
 
 def test_sections_appear_only_with_their_data(run: Path, workspace: OvercookedWorkspace) -> None:
     layout = load_run(run).best_layout
     bare = {a.get("id") for _, a in page_of(run).elements}
-    assert "conditions" not in bare
+    assert "panels" not in bare
     assert "people" not in bare
     people = {
         "note": "12 walks",
@@ -140,8 +140,8 @@ def test_sections_appear_only_with_their_data(run: Path, workspace: OvercookedWo
         "curves": [{"label": "Eq. 1", "values": [0.5, float("nan")]}],
         "table": {"columns": ["kitchen", "walks"], "rows": [["<b>x</b>", 12]]},
     }
-    page = page_of(run, conditions=[Condition("random", layout, -1.5, 80.0)], recorded_play=people)
-    assert {"conditions", "people", "curves"} <= {a.get("id") for _, a in page.elements}
+    page = page_of(run, panels=[Panel("random", layout, -1.5, 80.0)], recorded_play=people)
+    assert {"panels", "people", "curves"} <= {a.get("id") for _, a in page.elements}
     assert page.data["recorded_play"]["curves"][0]["values"] == [0.5, None]
     assert not [t for t, _ in page.elements if t == "b"], "cells are text, not markup"
 

@@ -7,8 +7,21 @@ import pytest
 
 from legible_envs.errors import WorkspaceError
 from legible_envs.overcooked import OvercookedWorkspace
-from legible_envs.workspace import register_workspace
+from legible_envs.workspace import list_workspaces, make_workspace, register_workspace, workspace_class
 from legible_envs.workspace_checks import check_workspace
+
+
+@pytest.mark.parametrize("name", [name for name, found in list_workspaces().items() if found.origin == "built in"])
+def test_built_in_workspaces_keep_the_contract(name):
+    check_workspace(make_workspace(name))
+    assert workspace_class(name).name == name
+
+
+@pytest.mark.usefixtures("aisle_package")
+def test_a_workspace_of_another_package_keeps_the_contract():
+    check_workspace(make_workspace("aisle"))
+    check_workspace(make_workspace("aisle", heavy=True))
+    assert list_workspaces()["aisle"].origin == "entry point of legible-workspace-example 0.1.0"
 
 
 @pytest.mark.parametrize("arguments", [{}, {"shape": (5, 9), "pots": 1}, {"cell_costs": np.full((7, 7), 1.5)}])

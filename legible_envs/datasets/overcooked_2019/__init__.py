@@ -1,7 +1,7 @@
-"""Real recorded play: Overcooked-AI's published 2019 human-human games, fetched, converted and cut into walks.
+"""Real recorded play: Overcooked-AI's published 2019 human-human games, fetched, converted and cut into trajectories.
 
     >>> fetch_recordings()                                            # doctest: +SKIP
-    >>> walks = recorded_trajectories(layouts=["cramped_room"])       # doctest: +SKIP
+    >>> trajectories = recorded_trajectories(layouts=["cramped_room"])       # doctest: +SKIP
 
 91,102 ticks of 76 games that 17 pairs of people played in five kitchens (Carroll et al., *On the Utility of Learning
 about Humans for Human-AI Coordination*, NeurIPS 2019).
@@ -33,7 +33,7 @@ __all__ = [
 ]
 
 GAMES_FILE: Final = "overcooked-ai-2019-games.npz"
-WALKS_FILE: Final = "overcooked-ai-2019-walks.npz"
+TRAJECTORIES_FILE: Final = "overcooked-ai-2019-walks.npz"
 
 
 def recordings_folder(folder: str | os.PathLike[str] | None = None) -> Path:
@@ -72,13 +72,13 @@ def fetch_recordings(
         The folder.
 
     Raises:
-        RecordingsError: No index can be reached, or the file is any other file. What was there before stays.
+        RecordingsError: No index can be reached, or the file is any other file. Earlier files stay as they are.
         OSError: The folder cannot be written to.
     """
     from legible_envs.datasets.overcooked_2019.convert import convert_tables
     from legible_envs.datasets.overcooked_2019.source import SHA256, download_archive, read_archive, read_members
+    from legible_envs.datasets.overcooked_2019.trajectories import all_trajectories
     from legible_envs.datasets.overcooked_2019.unpickle import read_table
-    from legible_envs.datasets.overcooked_2019.walks import all_walks
     from legible_envs.rollouts.trajectory import save_trajectories
 
     place = recordings_folder(folder)
@@ -87,7 +87,7 @@ def fetch_recordings(
     archive = read_archive(source) if source is not None else download_archive(index_urls, progress)
     tables = {split: read_table(data) for split, data in read_members(archive).items()}
     games = convert_tables(tables, progress)
-    save_trajectories(place / WALKS_FILE, all_walks(games))
+    save_trajectories(place / TRAJECTORIES_FILE, all_trajectories(games))
     write_games(place / GAMES_FILE, games, {"source_sha256": SHA256})
     return place
 
@@ -95,7 +95,7 @@ def fetch_recordings(
 def _is_there(place: Path) -> bool:
     try:
         load_recorded_games(place, layouts=())
-        return (place / WALKS_FILE).is_file()
+        return (place / TRAJECTORIES_FILE).is_file()
     except RecordingsError:
         return False
 
@@ -141,7 +141,7 @@ def recorded_trajectories(
     min_candidates: int = 2,
     round_trips: bool = False,
 ) -> list[Trajectory]:
-    """Walks of recorded people: empty-handed from a pot or serving station to an onion or dish station.
+    """Trajectories of recorded people: empty-handed from a pot or serving station to an onion or dish station.
 
     With the defaults there are 502, 807, 424 and 673 of them in ``asymmetric_advantages``, ``coordination_ring``,
     ``cramped_room`` and ``random3``, and none in ``random0``, where pots and dispensers are in different rooms.
@@ -149,20 +149,20 @@ def recorded_trajectories(
     Args:
         folder: Where :func:`fetch_recordings` wrote the games.
         layouts: Names of kitchens; all if None.
-        candidate_set: ``"all"``: every dispenser in reach. ``"game"``: those among them that are of use when the walk
-            begins (onions while a pot in reach is not full, dishes while fewer are held than soups are on the fire);
-            walks to anything else are left out.
-        min_positions: Fewest floor cells of a walk, repeats dropped.
-        min_candidates: Fewest candidates of a walk.
-        round_trips: Whether to keep walks that end on the cell they began on: start and goal share it, so that no walk
-            was needed.
+        candidate_set: ``"all"``: every dispenser in reach. ``"game"``: those among them that are of use when the
+            trajectory begins (onions while a pot in reach is not full, dishes while fewer are held than soups are on
+            the fire); trajectories to other goals are left out.
+        min_positions: Fewest floor cells of a trajectory, repeats dropped.
+        min_candidates: Fewest candidates of a trajectory.
+        round_trips: Whether to keep trajectories that end on the cell they began on: start and goal share it, so that
+            the player did not have to move.
 
     Raises:
         RecordingsError: See :func:`load_recorded_games`.
     """
-    from legible_envs.datasets.overcooked_2019.walks import walks_of_games
+    from legible_envs.datasets.overcooked_2019.trajectories import trajectories_of_games
 
-    return walks_of_games(
+    return trajectories_of_games(
         load_recorded_games(folder, layouts),
         candidate_set,
         min_positions=min_positions,
@@ -176,12 +176,12 @@ def recording_stats(folder: str | os.PathLike[str] | None = None) -> list[dict[s
 
     Returns:
         Rows with ``layout``, ``games``, ``pairs``, ``ticks`` (recorded transitions), ``deliveries``, ``idle`` (share of
-        player-ticks without a change of cell, facing or hands), ``walks`` (see :func:`recorded_trajectories`, every
-        length) and ``scored_walks`` (with its defaults). The last row is ``"all"``.
+        player-ticks without a change of cell, facing or hands), ``trajectories`` (see :func:`recorded_trajectories`,
+        every length) and ``scored_trajectories`` (with its defaults). The last row is ``"all"``.
 
     Raises:
         RecordingsError: See :func:`load_recorded_games`.
     """
-    from legible_envs.datasets.overcooked_2019.walks import statistics
+    from legible_envs.datasets.overcooked_2019.trajectories import statistics
 
     return statistics(load_recorded_games(folder))

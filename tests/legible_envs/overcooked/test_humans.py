@@ -15,7 +15,7 @@ from scipy.stats import chisquare
 
 import legible_envs  # noqa: F401
 from legible_envs import LayoutError
-from legible_envs.datasets.overcooked_2019 import RecordingsError, recorded_trajectories
+from legible_envs.datasets.overcooked_2019 import recorded_trajectories
 from legible_envs.legibility import From, env_legibility, optimal_costs, prefix_weights
 from legible_envs.observer import ObserverModel
 from legible_envs.overcooked import OvercookedLayout, soup_task
@@ -231,15 +231,13 @@ def test_spread_between_people_is_found():
         rationality_spread(walks[:60])
 
 
+@pytest.mark.data
 @pytest.mark.parametrize(
     ("name", "published"),
     [("asymmetric_advantages", 1.67), ("coordination_ring", 1.11), ("cramped_room", 1.29), ("random3", 1.12)],
 )
 def test_recorded_people(name, published):
-    try:
-        walks = recorded_trajectories(layouts=[name])
-    except RecordingsError as error:
-        pytest.skip(str(error))
+    walks = recorded_trajectories(layouts=[name])
     fit = fit_rationality(walks)
     assert fit.rationality == pytest.approx(published, abs=0.005)
     assert fit.interval[0] < published < fit.interval[1]
@@ -412,11 +410,9 @@ def test_one_cell_says_no_more_than_the_prior(population):
             assert right < prior + 0.25
 
 
+@pytest.mark.data
 def test_one_cell_of_recorded_play_says_no_more_than_the_prior():
-    try:
-        walks = recorded_trajectories(layouts=["coordination_ring"])
-    except RecordingsError as error:
-        pytest.skip(str(error))
+    walks = recorded_trajectories(layouts=["coordination_ring"])
     rows = BayesianGoalPredictor().fit(walks).predict_proba([walk.first(1) for walk in walks])
     assert rows.max(axis=1) == pytest.approx([1 / len(walk.candidates) for walk in walks])
 

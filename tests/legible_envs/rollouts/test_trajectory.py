@@ -26,9 +26,10 @@ from legible_envs.rollouts import (
     CUTS,
     Trajectory,
     load_trajectories,
+    read_csv,
     record_episode,
     save_trajectories,
-    trajectories_from_rollout,
+    write_csv,
 )
 from legible_envs.tabletop import Table, TableObject, TabletopLayout, VirtualObstacle
 
@@ -116,8 +117,14 @@ def test_a_layout_of_an_unknown_kind_is_named(tmp_path: Path) -> None:
         arrays = dict(file)
     records = arrays["records"].tobytes().replace(b'"kind": "tabletop"', b'"kind": "seesaw"')
     np.savez(tmp_path / "w.npz", **{**arrays, "records": np.frombuffer(records, dtype=np.uint8)})
-    with pytest.raises(ValueError, match=r"kinds \['seesaw'\]; this version reads \['overcooked', 'tabletop'\]"):
+    known = r"'seesaw'; known: \['overcooked', 'tabletop'.*entry point group 'legible.layouts'"
+    with pytest.raises(ValueError, match=f"w.npz: no layout kind named {known}"):
         load_trajectories(tmp_path / "w.npz")
+    write_csv(tmp_path / "w.csv", [reach([(0.1, 0.1)], layout=TABLES[0])])
+    header, row = (tmp_path / "w.csv").read_text().splitlines()
+    (tmp_path / "w.csv").write_text(f"{header},layout_kind\n{row},seesaw\n")
+    with pytest.raises(ValueError, match=f"trajectory '0': no layout kind named {known}"):
+        read_csv(tmp_path / "w.csv")
 
 
 def test_unreadable_files_are_refused_in_words(tmp_path: Path) -> None:
@@ -329,7 +336,7 @@ def test_views_of_an_episode_give_the_same_walks() -> None:
         observation, _, terminated, truncated, info = env.step(player(observation, info))
         views.append(env.unwrapped.view())  # type: ignore[attr-defined]
         over = terminated or truncated
-    assert trajectories_from_rollout(views) == expected
+    assert trajectories_from_views(views) == expected
     assert trajectories_from_views(views, min_positions=99) == []
     with pytest.raises(ValueError, match="no views"):
         trajectories_from_views([])

@@ -1,4 +1,4 @@
-"""Walks and counts of recorded games."""
+"""Trajectories and counts of recorded games."""
 
 from __future__ import annotations
 
@@ -12,27 +12,27 @@ from legible_envs.datasets.overcooked_2019.games import RecordedGame
 from legible_envs.overcooked.trajectories import dispensers_in_reach, trajectories
 from legible_envs.rollouts.trajectory import Trajectory
 
-__all__ = ["all_walks", "statistics", "walks_of_games"]
+__all__ = ["all_trajectories", "statistics", "trajectories_of_games"]
 
 _FULL = 3
 _DISH = 5
 
 
-def all_walks(games: Sequence[RecordedGame]) -> list[Trajectory]:
-    """Every walk, however short, with all dispensers in reach as candidates."""
-    return walks_of_games(games, "all", min_positions=1, min_candidates=1, round_trips=True)
+def all_trajectories(games: Sequence[RecordedGame]) -> list[Trajectory]:
+    """Every trajectory, however short, with all dispensers in reach as candidates."""
+    return trajectories_of_games(games, "all", min_positions=1, min_candidates=1, round_trips=True)
 
 
-def walks_of_games(
+def trajectories_of_games(
     games: Sequence[RecordedGame], candidate_set: Literal["game", "all"] = "all", **limits: Any
 ) -> list[Trajectory]:
-    """Walks of games as trajectories; see :func:`legible_envs.datasets.overcooked_2019.recorded_trajectories`."""
+    """Trajectories of games; see :func:`legible_envs.datasets.overcooked_2019.recorded_trajectories`."""
     if candidate_set not in ("game", "all"):
         raise ValueError(f"`candidate_set` must be 'game' or 'all', got {candidate_set!r}")
     return [
-        walk
+        found
         for game in games
-        for walk in trajectories(
+        for found in trajectories(
             game.layout,
             game.cells,
             game.facing,
@@ -75,7 +75,7 @@ def statistics(games: Sequence[RecordedGame]) -> list[dict[str, Any]]:
 
 
 def _row(name: str, games: list[RecordedGame]) -> dict[str, Any]:
-    scored = walks_of_games(games, min_positions=3, min_candidates=2, round_trips=False)
+    scored = trajectories_of_games(games, min_positions=3, min_candidates=2, round_trips=False)
     idle = [_idle(game) for game in games]
     return {
         "layout": name,
@@ -84,8 +84,8 @@ def _row(name: str, games: list[RecordedGame]) -> dict[str, Any]:
         "ticks": sum(game.num_ticks for game in games),
         "deliveries": int(sum(game.rewards.sum() for game in games)) // 20,
         "idle": float(np.concatenate(idle).mean()) if idle else float("nan"),
-        "walks": len(all_walks(games)),
-        "scored_walks": len(scored),
+        "trajectories": len(all_trajectories(games)),
+        "scored_trajectories": len(scored),
     }
 
 
