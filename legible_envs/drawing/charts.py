@@ -84,6 +84,11 @@ class Size(NamedTuple):
     text: float
     has_words: bool
 
+    @property
+    def scale(self) -> float:
+        """Heights of panels, as a multiple of those in a report: between that of the widths and that of the texts."""
+        return (self.width / 6.0 + self.text / 9.5) / 2
+
 
 SIZES: Final[dict[ChartSize, Size]] = {
     "report": Size(6.0, 9.5, has_words=True),
@@ -169,7 +174,7 @@ class Chart(Figure):
         note: At the foot, in as many lines as it takes.
         description: What is to be seen, for screen readers.
         size: See :data:`SIZES`; sizes of papers leave out heading and note.
-        height: Of the panels in inches, at the width of a report: other sizes scale it by their own width.
+        height: Of the panels in inches, in a report; other sizes multiply it by their ``scale``.
         width: Of the whole in inches; None takes the size's.
 
     Attributes:
@@ -199,7 +204,7 @@ class Chart(Figure):
             above, below = [], []
         head, foot = (sum(_LINE * size for _, size, _, _ in lines) / 72 for lines in (above, below))
         head, foot = head + _PAD * bool(above), foot + _PAD * bool(below)
-        tall = height * own.width / SIZES["report"].width + head + foot
+        tall = height * own.scale + head + foot
         super().__init__(figsize=(width, tall), layout="constrained")
         self.title, self.description = title, description
         self.tips: dict[str, list[str]] = {}

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from legible_envs.drawing.charts import (
-    SIZES,
     SOFT,
     Chart,
     ChartSize,
@@ -170,7 +169,7 @@ def confusion_figure(
             str(matrix.attrs.get("evaluation", "")),
             description=f"Confusion matrix of {', '.join(goals)}.",
             size=size,
-            height=(cell * len(goals) + below) * SIZES["report"].width / own.width,
+            height=(cell * len(goals) + below) / own.scale,
             width=max(own.width, beside + cell * len(goals)),
         )
         axes = chart.subplots()
@@ -191,7 +190,7 @@ def confusion_figure(
             axes.annotate(goal, (0, i), (-6, 0.1 * own.text), weight="bold", **_AT_EDGE)
             axes.annotate(f"n = {total[i, 0]:.0f}", (0, i), (-6, -own.text), size="small", color=SOFT, **_AT_EDGE)
         axes.set_xlabel("predicted goal")
-        axes.set_ylabel("true goal", labelpad=72 * names_and_counts + 0.5 * own.text)
+        axes.set_ylabel("true goal", labelpad=72 * names_and_counts + 0.2 * own.text + 6)
         return chart
 
 

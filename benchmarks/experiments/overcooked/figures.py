@@ -12,7 +12,7 @@ from benchmarks.experiments.conditions import compare_layouts, slug
 from benchmarks.experiments.figures import accuracy_by_condition, bars_by_condition, learning_by_condition
 from benchmarks.experiments.overcooked import tables
 from benchmarks.experiments.overcooked.sweep import CONDITIONS
-from legible_envs.drawing.charts import SIZES, SOFT, Chart, ChartSize, number_squares, save_figure, styled
+from legible_envs.drawing.charts import SOFT, Chart, ChartSize, number_squares, save_figure, styled
 from predictors.evaluation.figures import confusion_figure
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def behaviour_map(elites: pd.DataFrame, *, size: ChartSize = "report") -> Chart:
             f"T tomato, O onion, C cabbage, F fish; white: no layout found. Values rounded; darkest {high:.1f}.",
             description="The best legibility for each number of obstacles and order.",
             size=size,
-            height=(2.0 * own.text / 72 * len(rows) + 0.9) * SIZES["report"].width / own.width,
+            height=(2.0 * own.text / 72 * len(rows) + 0.9) / own.scale,
             width=max(own.width, cell * len(orders) + 0.9),
         )
         axes = chart.subplots()

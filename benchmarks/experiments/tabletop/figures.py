@@ -12,7 +12,16 @@ from benchmarks.experiments.conditions import compare_layouts, slug
 from benchmarks.experiments.figures import accuracy_by_condition, bars_by_condition, learning_by_condition
 from benchmarks.experiments.tabletop import tables
 from benchmarks.experiments.tabletop.sweep import CONDITIONS
-from legible_envs.drawing.charts import COLOURS, Chart, ChartSize, legend_above, round_upwards, save_figure, styled
+from legible_envs.drawing.charts import (
+    COLOURS,
+    SIZES,
+    Chart,
+    ChartSize,
+    legend_above,
+    round_upwards,
+    save_figure,
+    styled,
+)
 from predictors.evaluation.figures import confusion_figure
 
 if TYPE_CHECKING:
@@ -126,7 +135,7 @@ def _panel(chart: Chart, axes: Axes, own: pd.DataFrame, title: str, predictors: 
     is_time = own["measure"].iloc[0] == "completion_time"
     low, high = float(own["low"].min()), float(own["high"].max())
     round_upwards(axes, low if is_time else min(0.0, low), high)
-    axes.set_title(title)
+    axes.set_title(title, size="small" if chart.get_size_inches()[0] < SIZES["report"].width else "medium")
     for j, predictor in enumerate(predictors):
         part = own[own["reader"] == predictor]
         at = part["condition"].map(CONDITIONS.index) + 0.16 * (j - (len(predictors) - 1) / 2)
