@@ -65,7 +65,8 @@ def _readable_svg(
     own = f"'{font}', " if font else ""
     family = f"font-family: {own}{_MEASURED}; "
     for text in root.getElementsByTagName("text"):  # nearly all have the one family, which is said once
-        text.setAttribute("style", text.getAttribute("style").replace(family, ""))
+        style = text.getAttribute("style").replace(family, "")
+        text.setAttribute("style", style.replace(_MEASURED, _FONTS))  # matplotlib 3.9 puts all into one "font"
     for name, value in {
         "role": "img",
         "font-family": own + _FONTS,
