@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from benchmarks.experiments.conditions import in_order
-from legible_envs.drawing.charts import COLOURS, SOFT, Chart, ChartSize, legend_above, round_upwards, styled
+from legible_envs.drawing.chart_parts import legend_above, round_upwards
+from legible_envs.drawing.charts import COLOURS, SOFT, Chart, ChartSize, styled
 from predictors.evaluation.figures import accuracy_figure, learning_curve_figure
 
 if TYPE_CHECKING:

@@ -12,17 +12,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from legible_envs.drawing.charts import (
-    SOFT,
-    Chart,
-    ChartSize,
-    label_ends,
-    line_style,
-    number_squares,
-    shares_upwards,
-    styled,
-    text_width,
-)
+from legible_envs.drawing.chart_parts import label_ends, line_style, number_squares, shares_upwards
+from legible_envs.drawing.charts import SOFT, Chart, ChartSize, styled, text_width
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from legible_envs.drawing.charts import Chart, ChartSize, label_ends, line_style, styled
+from legible_envs.drawing.chart_parts import label_ends, line_style
+from legible_envs.drawing.charts import Chart, ChartSize, styled
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -12,7 +12,8 @@ from benchmarks.experiments.conditions import compare_layouts, slug
 from benchmarks.experiments.figures import accuracy_by_condition, bars_by_condition, learning_by_condition
 from benchmarks.experiments.overcooked import tables
 from benchmarks.experiments.overcooked.sweep import CONDITIONS
-from legible_envs.drawing.charts import SOFT, Chart, ChartSize, number_squares, save_figure, styled
+from legible_envs.drawing.chart_parts import number_squares
+from legible_envs.drawing.charts import SOFT, Chart, ChartSize, save_figure, styled
 from predictors.evaluation.figures import confusion_figure
 
 if TYPE_CHECKING:

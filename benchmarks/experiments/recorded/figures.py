@@ -5,17 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from legible_envs.drawing.charts import (
-    COLOURS,
-    INK,
-    RULE,
-    SOFT,
-    Chart,
-    ChartSize,
-    save_figure,
-    shares_upwards,
-    styled,
-)
+from legible_envs.drawing.chart_parts import shares_upwards
+from legible_envs.drawing.charts import COLOURS, INK, RULE, SOFT, Chart, ChartSize, save_figure, styled
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -12,16 +12,8 @@ from benchmarks.experiments.conditions import compare_layouts, slug
 from benchmarks.experiments.figures import accuracy_by_condition, bars_by_condition, learning_by_condition
 from benchmarks.experiments.tabletop import tables
 from benchmarks.experiments.tabletop.sweep import CONDITIONS
-from legible_envs.drawing.charts import (
-    COLOURS,
-    SIZES,
-    Chart,
-    ChartSize,
-    legend_above,
-    round_upwards,
-    save_figure,
-    styled,
-)
+from legible_envs.drawing.chart_parts import legend_above, round_upwards
+from legible_envs.drawing.charts import COLOURS, SIZES, Chart, ChartSize, save_figure, styled
 from predictors.evaluation.figures import confusion_figure
 
 if TYPE_CHECKING:

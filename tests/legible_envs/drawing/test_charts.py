@@ -17,20 +17,15 @@ from hypothesis import strategies as st
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from legible_envs.drawing.charts import (
-    COLOURS,
-    INK,
-    SIZES,
-    Chart,
+from legible_envs.drawing.chart_parts import (
     label_ends,
     legend_above,
     line_style,
     number_squares,
     round_upwards,
-    save_figure,
     shares_upwards,
-    styled,
 )
+from legible_envs.drawing.charts import COLOURS, INK, SIZES, Chart, save_figure, styled
 
 SVG = "{http://www.w3.org/2000/svg}"
 
