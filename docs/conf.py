@@ -44,11 +44,12 @@ html_css_files = ["site.css"]
 html_show_sphinx = False
 
 
-def skip_what_scikit_learn_adds(app, what, name, obj, skip, options):
-    """Methods that `BaseEstimator` makes for metadata routing, with links into its own manual."""
-    return True if name.startswith("set_") and name.endswith("_request") else skip
+def skip_what_libraries_add(app, what, name, obj, skip, options):
+    """Methods made for every subclass, with links into manuals of their own: of scikit-learn, and of matplotlib."""
+    is_added = name.startswith("set_") and name.endswith("_request")
+    return True if is_added or (name == "set" and str(obj.__module__).startswith("matplotlib")) else skip
 
 
 def setup(app):
     """Register with Sphinx."""
-    app.connect("autodoc-skip-member", skip_what_scikit_learn_adds)
+    app.connect("autodoc-skip-member", skip_what_libraries_add)

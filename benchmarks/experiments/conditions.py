@@ -1,4 +1,4 @@
-"""Conditions compared over their layouts and participants: tables, tests, and the figures that show them."""
+"""Conditions compared over their layouts and participants: tables and tests."""
 
 from __future__ import annotations
 
@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from predictors.evaluation.figures import COLOURS, Drawing, accuracy_figure, footnote, heading, learning_curve_figure
-
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -19,22 +17,16 @@ if TYPE_CHECKING:
 __all__ = [
     "Agreement",
     "Comparisons",
-    "accuracy_by_condition",
     "agreements",
-    "bars_by_condition",
     "beside_published",
     "compare_layouts",
     "compare_participants",
     "figures_of_merit",
     "in_order",
-    "learning_by_condition",
-    "round_up",
     "slug",
     "stacked",
     "variance_rows",
 ]
-
-_SOFT, _RULE = "#5d6670", "#e3e6ea"
 
 
 def slug(*words: str) -> str:
@@ -206,120 +198,3 @@ def variance_rows(rows: pd.DataFrame, predictors: Sequence[str], shown: pd.DataF
     table = pd.concat(parts, ignore_index=True)
     front = ["predictor", "unit", "fraction"]
     return table[[*front, *(column for column in table if column not in front)]]
-
-
-# -- figures ----------------------------------------------------------------------------------------------------------
-
-
-def accuracy_by_condition(
-    comparison: Comparison, conditions: Sequence[str], chance: float, title: str, subtitle: str, note: str = ""
-) -> str:
-    """Accuracy against fraction observed, a line per condition in the order given, bands of Tukey's half-width."""
-    means = in_order(comparison.means, condition=conditions)
-    table = means.rename(columns={"condition": "predictor", "mean": "accuracy"}).assign(chance=chance)
-    table[["low", "high"]] = table[["low", "high"]].clip(0, 1)
-    if note:
-        table.attrs["evaluation"] = note
-    return accuracy_figure(table, title=title, subtitle=subtitle)
-
-
-def learning_by_condition(curves: pd.DataFrame, predictor: str, conditions: Sequence[str], what: str) -> str:
-    """Accuracy against how much was learned from, a line per condition, bands of one deviation between layouts.
-
-    Args:
-        curves: ``predictor, condition, layout, share, size, accuracy``.
-        predictor: Whose.
-        conditions: In order.
-        what: Plural of what is learned from.
-    """
-    own = curves[curves["predictor"] == predictor]
-    # Training sets may differ by one between layouts: shares are what is equal.
-    sizes = own.groupby("share")["size"].mean().round().astype(int)
-    each = own.groupby(["condition", "share", "layout"], sort=False, as_index=False)["accuracy"].mean()
-    grouped = each.groupby(["condition", "share"], sort=False)["accuracy"]
-    table = in_order(grouped.agg(accuracy="mean", sd="std").reset_index(), condition=conditions)
-    table = table.assign(
-        predictor=table["condition"],
-        size=table["share"].map(sizes),
-        low=(table["accuracy"] - table["sd"]).clip(0, 1),
-        high=(table["accuracy"] + table["sd"]).clip(0, 1),
-    )
-    return learning_curve_figure(
-        table,
-        title=f"What more {what} buy: {predictor}",
-        subtitle="mean over fractions observed; bands: one standard deviation between layouts",
-    )
-
-
-@dataclasses.dataclass(frozen=True)
-class _Bars:
-    left: float = 70.0
-    right: float = 20.0
-    top: float = 84.0
-    bottom: float = 300.0
-    width: float = 720.0
-    height: float = 360.0
-
-
-def bars_by_condition(
-    table: pd.DataFrame, series: Mapping[str, str], title: str, subtitle: str, note: str, places: str = ".2f"
-) -> str:
-    """A group of bars for each condition, a bar for each series; heights from 0 to the largest, or 1 for shares.
-
-    Args:
-        table: ``condition``, and a column for each series.
-        series: Names by column; the first is drawn in grey, as what the others are compared with.
-        title: Heading.
-        subtitle: Below it.
-        note: At the foot.
-        places: Format of the numbers on the bars.
-    """
-    box = _Bars()
-    drawing = Drawing(box.width, box.height, title, f"{title}: {', '.join(series.values())}.")
-    heading(drawing, title, subtitle)
-    most = float(np.nanmax(table[list(series)].to_numpy(dtype=np.float64)))
-    top = 1.0 if 0.3 < most <= 1.0 else round_up(most)
-    for value in np.linspace(0, top, 6):
-        y = box.bottom - value / top * (box.bottom - box.top)
-        drawing.line([(box.left, y), (box.width - box.right, y)], _RULE if value else _SOFT)
-        drawing.text(box.left - 9, y + 4, f"{value:.3g}", "end", fill=_SOFT)
-    step = (box.width - box.right - box.left) / len(table)
-    for i, row in enumerate(table.to_dict("records")):
-        _group_of_bars(
-            drawing, box, box.left + step * i, step, {str(k): v for k, v in row.items()}, series, top, places
-        )
-    x = box.left
-    for j, name in enumerate(series.values()):
-        drawing.box(x, 58, 12, 12, _SOFT if not j else COLOURS[j - 1])
-        drawing.text(x + 18, 68, name)
-        x += 40 + 7 * len(name)
-    footnote(drawing, note)
-    return drawing.render()
-
-
-def _group_of_bars(
-    drawing: Drawing,
-    box: _Bars,
-    x: float,
-    step: float,
-    row: Mapping[str, Any],
-    series: Mapping[str, str],
-    top: float,
-    places: str,
-) -> None:
-    bar = 0.8 * step / len(series)
-    for j, (column, name) in enumerate(series.items()):
-        value = float(row[column])
-        if not np.isfinite(value):
-            continue
-        left, y = x + 0.1 * step + bar * j, box.bottom - value / top * (box.bottom - box.top)
-        colour = _SOFT if not j else COLOURS[j - 1]
-        drawing.box(left, y, bar - 3, box.bottom - y, colour, f"{row['condition']}, {name}: {value:.4g}")
-        drawing.text(left + (bar - 3) / 2, y - 5, f"{value:{places}}".removeprefix("0"), "middle", font_size=11)
-    drawing.text(x + step / 2, box.bottom + 20, str(row["condition"]), "middle", font_weight="600")
-
-
-def round_up(value: float) -> float:
-    """The next of 1, 2, 2.5, 5 times a power of ten."""
-    power = 10.0 ** np.floor(np.log10(value))
-    return float(next(power * step for step in (1, 2, 2.5, 5, 10) if power * step >= value * (1 - 1e-9)))

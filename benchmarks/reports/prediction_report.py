@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from rich.console import Console
 
+    from legible_envs.drawing.charts import Chart
     from legible_envs.rollouts.trajectory import Cut, Trajectory
     from predictors.evaluation.cross_validation import Comparison, Evaluation, LearningCurve
     from predictors.evaluation.splits import Groups
@@ -199,11 +200,13 @@ def write_evaluation(results: PredictionResults, folder: Path, *, title: str = "
     Raises:
         OSError: The folder cannot be made or written to.
     """
+    from legible_envs.drawing.charts import save_figure
+
     folder.mkdir(parents=True, exist_ok=True)
     written = [_write(folder / f"{name}.csv", table.to_csv(index=False)) for name, table in _tables(results).items()]
     for name in _FIGURES:  # those of an earlier evaluation must not stand beside this one's tables
         (folder / f"{name}.svg").unlink(missing_ok=True)
-    written += [_write(folder / f"{name}.svg", svg) for name, svg in _drawn(results).items()]
+    written += [save_figure(folder / f"{name}.svg", figure) for name, figure in _drawn(results).items()]
     written.append(_write(folder / _FILE, json.dumps(_about(results), indent=1)))
     written.append(_write(folder / "report.html", _page(folder, title)))
     return written
@@ -259,7 +262,7 @@ def _tables(results: PredictionResults) -> dict[str, pd.DataFrame]:
     return tables
 
 
-def _drawn(results: PredictionResults) -> dict[str, str]:
+def _drawn(results: PredictionResults) -> dict[str, Chart]:
     from predictors.evaluation.figures import accuracy_figure, confusion_figure, learning_curve_figure
 
     found = results.evaluation
@@ -268,7 +271,7 @@ def _drawn(results: PredictionResults) -> dict[str, str]:
     matrix = found.confusion_matrix(best, fraction=at)
     figures = {
         "accuracy": accuracy_figure(found),
-        "confusion": confusion_figure(matrix, title=f"Goals and predictions of {best}, {100 * at:.0f} % observed"),
+        "confusion": confusion_figure(matrix, title=f"Predictions of {best}, {100 * at:.0f} % observed"),
     }
     if results.curve is not None:
         figures["learning_curve"] = learning_curve_figure(results.curve)

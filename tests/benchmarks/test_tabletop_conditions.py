@@ -13,8 +13,6 @@ import pandas as pd
 import pytest
 
 from benchmarks.experiments.conditions import (
-    accuracy_by_condition,
-    bars_by_condition,
     beside_published,
     compare_layouts,
     figures_of_merit,
@@ -22,6 +20,7 @@ from benchmarks.experiments.conditions import (
     slug,
     stacked,
 )
+from benchmarks.experiments.figures import accuracy_by_condition, bars_by_condition
 from benchmarks.experiments.predictor_settings import PredictorSetting
 from benchmarks.experiments.tabletop import QUICK, Settings, narrative, reproduce, run, sections, sweep, tables
 from benchmarks.experiments.trial_rows import accuracy_rows, by_table, confusion_matrix, curve_rows, logged_rows
@@ -364,8 +363,8 @@ def test_means_are_of_layouts_and_spread_is_between_them() -> None:
 def test_what_is_said_below_a_figure_stands_in_it(results: tables.Results) -> None:
     each, _ = compare_layouts(tables.accuracy_rows(results), results.predictors[0])
     plain, noted = (accuracy_by_condition(each, sweep.CONDITIONS, 0.2, "T", "S", note) for note in ("", "Look here."))
-    assert "Look here." in noted
-    assert "Look here." not in plain
+    assert "Look here." in [text.get_text() for text in noted.texts]
+    assert "Look here." not in [text.get_text() for text in plain.texts]
 
 
 def test_pieces_of_figures() -> None:
@@ -373,7 +372,15 @@ def test_pieces_of_figures() -> None:
     table = pd.DataFrame({"a": ["y", "x", "y"], "b": [1, 2, 0]})
     assert in_order(table, a=["x", "y"], b=[0, 1, 2])["b"].tolist() == [2, 0, 1]
     bars = pd.DataFrame({"condition": ["A", "B"], "p": [0.001, 0.0042], "q": [float("nan"), 0.002]})
-    svg = bars_by_condition(bars, {"p": "paper", "q": "ours"}, "T", "S", "N", ".4f")
-    assert ".0042" in svg
-    assert "0.005<" in svg  # the top of the axis
-    assert "nan" not in svg
+    figure = bars_by_condition(bars, {"p": "paper", "q": "ours"}, "T", "S", "N", ".4f")
+    (axes,) = figure.axes
+    assert [bar.get_height() for bar in axes.patches] == [0.001, 0.0042, 0.002]  # none for what is not a number
+    assert [round(bar.get_x() + bar.get_width() / 2) for bar in axes.patches] == [0, 1, 1]
+    assert [text.get_text() for text in axes.texts] == [".0010", ".0042", ".0020"]
+    assert axes.get_ylim() == pytest.approx((0, 0.005))
+    assert [label.get_text() for label in axes.get_xticklabels()] == ["A", "B"]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["paper", "ours"]
+    assert {text.get_text() for text in figure.texts} == {"T", "S", "N"}
+    assert "nan" not in figure._repr_svg_()
+    shares = bars_by_condition(bars.assign(p=[0.4, 0.97]), {"p": "paper"}, "T", "S", "N")
+    assert shares.axes[0].get_ylim() == (0, 1)

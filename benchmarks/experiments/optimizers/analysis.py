@@ -11,7 +11,7 @@ from benchmarks.experiments.optimizers import narrative
 from benchmarks.experiments.optimizers.figures import anytime_figure
 from benchmarks.experiments.optimizers.sweep import LOCAL_SEARCH, METHODS, OPTIMUM_5X5, OURS, PAPER_METHODS, PUBLISHED
 from benchmarks.reports.experiment_report import Section, write_tables
-from predictors.evaluation.figures import save_figure
+from legible_envs.drawing.charts import save_figure
 from predictors.evaluation.statistics import hedges_g, holm
 
 if TYPE_CHECKING:
@@ -57,9 +57,9 @@ def sections(folder: str | Path) -> list[Section]:
     for (grid, budget), part in curves.groupby(["grid", "budget"], sort=False):
         if budget == "paper":
             continue
-        text = anytime_figure(part, title=f"Best layout so far, {grid}, {int(str(budget)):,} evaluations")
+        figure = anytime_figure(part, title=f"Best layout so far, {grid}, {int(str(budget)):,} evaluations")
         drawn.append(folder / "figures" / f"anytime_{grid}_{budget}.svg")
-        save_figure(drawn[-1], text)
+        save_figure(drawn[-1], figure)
     return [
         Section(
             "What each search finds",

@@ -1,75 +1,66 @@
-"""Figures of the comparison: scores against evaluations, as self-contained SVG."""
+"""Figures of the comparison: best scores against evaluations."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from predictors.evaluation.figures import COLOURS, Drawing, footnote, heading, round_ticks
+from legible_envs.drawing.chart_parts import label_ends, line_style
+from legible_envs.drawing.charts import Chart, ChartSize, styled
 
 if TYPE_CHECKING:
     import pandas as pd
 
 __all__ = ["anytime_figure"]
 
-_SOFT, _RULE = "#5d6670", "#e3e6ea"
-_DASHES = ("", "7 4", "2 3", "9 3 2 3")
-_LEFT, _TOP, _BOTTOM, _LEGEND = 70.0, 66.0, 84.0, 225.0
 
-
-def anytime_figure(curves: pd.DataFrame, *, title: str, width: float = 760, height: float = 420) -> str:
+def anytime_figure(curves: pd.DataFrame, *, title: str, size: ChartSize = "report") -> Chart:
     """Best score so far against evaluations (logarithmic), a line and a band per method.
 
     Args:
         curves: Columns ``method, scored, best, low, high``.
         title: Its heading.
-        width: In pixels.
-        height: In pixels.
+        size: See :data:`legible_envs.drawing.charts.SIZES`.
 
     Returns:
-        The SVG.
+        The figure.
     """
-    names = list(dict.fromkeys(curves["method"]))
-    drawing = Drawing(width, height, title, f"Best score against evaluations for {', '.join(names)}.")
-    heading(drawing, title, "mean over seeds; bands: from the lower to the upper quartile")
-    right, foot = width - _LEGEND, height - _BOTTOM
-    first, last = np.log10(curves["scored"].min()), np.log10(curves["scored"].max())
-    low, high = float(curves["low"].min()), float(curves[["high", "best"]].max().max())
+    methods = {str(name): part.sort_values("scored") for name, part in curves.groupby("method", sort=False)}
+    with styled(size):
+        chart = Chart(
+            title,
+            "mean over seeds; bands: from the lower to the upper quartile",
+            "The first point is the random layouts that every search begins with. Score: legibility per execution.",
+            description=f"Best score against evaluations for {', '.join(methods)}.",
+            size=size,
+            height=3.1,
+        )
+        axes = chart.subplots()
+        axes.set_xscale("log")
+        ends = []
+        for number, (name, part) in enumerate(methods.items()):
+            style, best = line_style(number), float(part["best"].iloc[-1])
+            axes.fill_between(part["scored"], part["low"], part["high"], color=style["color"], alpha=0.12, linewidth=0)
+            axes.plot(part["scored"], part["best"], label=name, **style)
+            minus = "\u2212" if best < 0 else ""
+            ends.append((f"{name} {minus}{abs(best):.1f}", best))
+        first, last = float(curves["scored"].min()), float(curves["scored"].max())
+        axes.set_xlim(first, last if last > first else 2 * first)
+        ticks = _round_counts(first, last)
+        axes.set_xticks(ticks, [f"{tick:,.0f}" for tick in ticks])
+        axes.minorticks_off()
+        axes.margins(y=0.02)
+        axes.set_xlabel("layouts scored")
+        axes.set_ylabel("best score so far")
+        label_ends(chart, axes, ends)
+        return chart
 
-    def x(scored: float) -> float:
-        return float(_LEFT + (np.log10(scored) - first) / ((last - first) or 1.0) * (right - _LEFT))
 
-    def y(score: float) -> float:
-        return float(foot - (score - low) / ((high - low) or 1.0) * (foot - _TOP))
-
-    for value in round_ticks(low, high):
-        drawing.line([(_LEFT, y(value)), (right, y(value))], _RULE)
-        drawing.text(_LEFT - 8, y(value) + 4, f"{value:g}", "end", fill=_SOFT)
-    for power in range(int(np.floor(first)), int(np.ceil(last)) + 1):
-        for step in (1, 2, 5) if last - first < 2 else (1,):
-            scored = float(step * 10**power)
-            if first - 1e-9 <= np.log10(scored) <= last + 1e-9:
-                drawing.line([(x(scored), foot), (x(scored), foot + 5)], _SOFT)
-                drawing.text(x(scored), foot + 20, f"{scored:,.0f}", "middle", fill=_SOFT)
-    drawing.line([(_LEFT, foot), (right, foot)], _SOFT)
-    drawing.text((_LEFT + right) / 2, foot + 42, "layouts scored", "middle")
-    ends = []
-    for i, name in enumerate(names):
-        part = curves[curves["method"] == name].sort_values("scored")
-        xs = [x(scored) for scored in part["scored"]]
-        highs = [(a, y(b)) for a, b in zip(xs, part["high"], strict=True)]
-        lows = [(a, y(b)) for a, b in zip(xs, part["low"], strict=True)]
-        colour, dash = COLOURS[i % len(COLOURS)], _DASHES[i % len(_DASHES)]
-        drawing.area(highs + lows[::-1], colour, 0.12)
-        drawing.line([(a, y(b)) for a, b in zip(xs, part["best"], strict=True)], colour, 2.2, dash)
-        ends.append((float(part["best"].iloc[-1]), i, name))
-    for place, (score, i, name) in enumerate(sorted(ends, reverse=True)):
-        colour, dash = COLOURS[i % len(COLOURS)], _DASHES[i % len(_DASHES)]
-        at = _TOP + 12 + 20 * place
-        drawing.line([(right + 10, at), (right + 30, at)], colour, 2.2, dash)
-        drawing.text(right + 36, at + 4, f"{name} {score:.1f}", fill=colour, font_weight="600")
-    footnote(
-        drawing, "The first point is the random layouts every search begins with. Score: legibility per execution."
-    )
-    return drawing.render()
+def _round_counts(first: float, last: float) -> list[float]:
+    """Round numbers on a logarithmic axis: powers of ten, or more of them where these are fewer than three."""
+    ticks: list[float] = []
+    for steps in ((1.0,), (1.0, 2.0, 5.0), (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)):
+        counts = [step * 10.0**power for power in range(13) for step in steps]
+        ticks = [count for count in counts if first * (1 - 1e-9) <= count <= last * (1 + 1e-9)]
+        if len(ticks) >= 3:
+            break
+    return ticks or [first]

@@ -1,4 +1,4 @@
-"""Figures of the experiment: SVG for curves and maps, PNG for kitchens."""
+"""Figures of the experiment: charts for curves and maps, pictures for kitchens."""
 
 from __future__ import annotations
 
@@ -6,126 +6,123 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from matplotlib.patches import Rectangle
 
-from benchmarks.experiments.conditions import (
-    accuracy_by_condition,
-    bars_by_condition,
-    compare_layouts,
-    learning_by_condition,
-    slug,
-)
+from benchmarks.experiments.conditions import compare_layouts, slug
+from benchmarks.experiments.figures import accuracy_by_condition, bars_by_condition, learning_by_condition
 from benchmarks.experiments.overcooked import tables
 from benchmarks.experiments.overcooked.sweep import CONDITIONS
-from predictors.evaluation.figures import Drawing, confusion_figure, footnote, heading, save_figure, shade
+from legible_envs.drawing.chart_parts import number_squares
+from legible_envs.drawing.charts import SOFT, Chart, ChartSize, save_figure, styled
+from predictors.evaluation.figures import confusion_figure
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
 
     from legible_envs.tasks import TaskGraph
 
 __all__ = ["behaviour_map", "boards", "draw_all", "rewards", "task_figure"]
 
-_INK, _SOFT = "#24292f", "#5d6670"
+_PANEL: Final = "#f4f7fa"
 TILE: Final = 44
 LEGIBLE_FIRST: Final = tuple(reversed(CONDITIONS))
 """The legible condition is the one to look for."""
-_READ: Final = (
-    "Simulated people; cross-validated; only walks with two valid goals or more. Two bands that do not overlap are "
-    "a difference by Tukey's test at that point."
+_NOTE: Final = (
+    "Simulated people; cross-validated; only trajectories with two valid goals or more. Two bands that do not overlap "
+    "are a difference by Tukey's test at that point."
 )
 
 
 # -- maps and graphs --------------------------------------------------------------------------------------------------
 
 
-def behaviour_map(elites: pd.DataFrame) -> str:
-    """The best layouts of every kind found: number of obstacles against order of ingredients, all searches together."""
+def behaviour_map(elites: pd.DataFrame, *, size: ChartSize = "report") -> Chart:
+    """The best layouts of every kind found: number of obstacles against order of ingredients, all searches together.
+
+    Args:
+        elites: ``obstacles, order, objective``.
+        size: See :data:`legible_envs.drawing.charts.SIZES`.
+    """
     best = elites.groupby(["obstacles", "order"])["objective"].max()
     orders = sorted({str(order) for _, order in best.index})
     rows = range(int(elites["obstacles"].max()), -1, -1)
+    values = np.array([[best.get((float(number), order), np.nan) for order in orders] for number in rows])
     high = float(best.max())
     low = float(np.percentile(best, 5))  # a few poor cells must not make all others look alike
-    cell, left, top = 26.0, 80.0, 74.0
-    width, height = left + cell * len(orders) + 24, top + cell * len(rows) + 110
-    drawing = Drawing(width, height, "Behaviour map", "The best legibility for each number of obstacles and order.")
-    heading(drawing, "Behaviour map: the best layout of every kind", "legibility (Eq. 3) of the best layout found")
-    for j, order in enumerate(orders):
-        x = left + cell * (j + 0.5) + 4
-        y = top + cell * len(rows) + 12
-        drawing.text(x, y, order, "end", font_size=10, fill=_SOFT, transform=f"rotate(-90 {x:.1f} {y:.1f})")
-    for i, obstacles in enumerate(rows):
-        y = top + cell * i
-        drawing.text(left - 8, y + cell / 2 + 4, f"{obstacles}", "end", fill=_SOFT)
-        for j, order in enumerate(orders):
-            x = left + cell * j
-            value = best.get((float(obstacles), order))
-            if value is None:
-                drawing.box(x + 1, y + 1, cell - 2, cell - 2, "#f6f7f8")
-                continue
-            share = max(0.0, (float(value) - low) / (high - low)) if high > low else 0.5
-            tip = f"{obstacles} obstacles, {order}: {float(value):.2f}"
-            drawing.box(x + 1, y + 1, cell - 2, cell - 2, shade(0.06 + 0.94 * share), tip)
-            ink = "#fff" if share > 0.5 else _INK
-            drawing.text(
-                x + cell / 2,
-                y + cell / 2 + 3,
-                f"{round(float(value)):d}".replace("-", "\u2212"),
-                "middle",
-                font_size=9,
-                fill=ink,
-            )
-    drawing.text(
-        left + cell * len(orders) / 2, height - 46, "ingredients and where they come, read row by row", "middle"
-    )
-    middle = top + cell * len(rows) / 2
-    drawing.text(28, middle, "virtual obstacles", "middle", transform=f"rotate(-90 28 {middle:.1f})")
-    footnote(
-        drawing, f"T tomato, O onion, C cabbage, F fish; white: no layout found. Values rounded; darkest {high:.1f}."
-    )
-    return drawing.render()
+    shares = np.clip((values - low) / (high - low), 0, 1) if high > low else np.where(np.isnan(values), np.nan, 0.5)
+    found = np.isfinite(values)
+    with styled(size) as own:
+        cell = max(1.9 * own.text / 72, (own.width - 0.9) / len(orders))
+        chart = Chart(
+            "Behaviour map: the best layout of every kind",
+            "legibility (Eq. 3) of the best layout found",
+            f"T tomato, O onion, C cabbage, F fish; white: no layout found. Values rounded; darkest {high:.1f}.",
+            description="The best legibility for each number of obstacles and order.",
+            size=size,
+            height=(2.0 * own.text / 72 * len(rows) + 0.9) / own.scale,
+            width=max(own.width, cell * len(orders) + 0.9),
+        )
+        axes = chart.subplots()
+        texts = [f"{round(float(value)):d}".replace("-", "\u2212") if value == value else "" for value in values.flat]
+        squares = number_squares(axes, 0.06 + 0.94 * shares, texts, dark=0.53, text="x-small")
+        chart.tip(
+            squares,
+            [
+                f"{number} obstacles, {order}: " + (f"{values[i, j]:.2f}" if found[i, j] else "no layout found")
+                for i, number in enumerate(rows)
+                for j, order in enumerate(orders)
+            ],
+        )
+        axes.set_xticks(range(len(orders)), orders, rotation=90, rotation_mode="anchor", ha="right", va="center")
+        axes.set_yticks(range(len(rows)), [str(number) for number in rows])
+        axes.tick_params(labelsize="small")
+        axes.set_xlabel("ingredients and where they come, read row by row")
+        axes.set_ylabel("virtual obstacles")
+        return chart
 
 
-def task_figure(task: TaskGraph) -> str:
+def task_figure(task: TaskGraph) -> Chart:
     """The precedence graph: subtasks as boxes, an arrow from what must be done before."""
-    groups = [[s for s in task.subtasks if s.name.startswith(f"{name}:")] for name in task.groups]
-    tall = 96.0
-    drawing = Drawing(720, 92 + tall * len(groups) + 34, "Task", "The precedence graph of the task.")
-    heading(
-        drawing,
-        "The task: three soups, in any order",
-        f"{task.num_sequences:,} valid sequences, {len(task.stages())} stages; arrows: must be done before",
-    )
-    for i, group in enumerate(groups):
-        y = 74 + tall * i
-        drawing.box(16, y, 688, tall - 12, "#f4f7fa")
-        drawing.text(30, y + 22, list(task.groups)[i], font_weight="600")
-        fetches, serve = group[:-1], group[-1]
-        for k, fetch in enumerate(fetches):
-            middle = y + (tall - 12) * (k + 1) / (len(fetches) + 1)
-            _task_box(drawing, 130, middle, f"{fetch.count} × {fetch.goals[0]} → pot")
-            drawing.line([(330, middle), (440, y + (tall - 12) / 2)], _SOFT, 1.4)
-        _arrow_head(drawing, 440, y + (tall - 12) / 2)
-        _task_box(drawing, 446, y + (tall - 12) / 2, f"{serve.goals[0]} → pot → serving")
-    footnote(drawing, "Fetches are what an observer predicts; the legs after an arrow to pot and serving are not.")
-    return drawing.render()
+    groups = {name: [s for s in task.subtasks if s.name.startswith(f"{name}:")] for name in task.groups}
+    with styled():
+        chart = Chart(
+            "The task: three soups, in any order",
+            f"{task.num_sequences:,} valid sequences, {len(task.stages())} stages; arrows: must be done before",
+            "Fetches are what an observer predicts; the legs after an arrow to pot and serving are not.",
+            description="The precedence graph of the task.",
+            height=0.78 * len(groups) + 0.24,
+        )
+        axes = chart.subplots()
+        axes.set_xlim(0, 5.76)
+        axes.set_ylim(0.78 * len(groups), 0)
+        axes.set_axis_off()
+        for i, (name, group) in enumerate(groups.items()):
+            top = 0.78 * i
+            axes.add_patch(Rectangle((0, top), 5.76, 0.68, color=_PANEL))
+            axes.text(0.12, top + 0.34, name, weight="bold", va="center_baseline")
+            *fetches, serve = group
+            serving = _task_box(axes, 4.65, top + 0.34, f"{serve.goals[0]} → pot → serving")
+            for k, fetch in enumerate(fetches):
+                middle = top + 0.68 * (k + 1) / (len(fetches) + 1)
+                box = _task_box(axes, 1.8, middle, f"{fetch.count} × {fetch.goals[0]} → pot")
+                ends = (serving.get_x() - 0.02, top + 0.34), (box.get_x() + box.get_width(), middle)
+                axes.annotate("", *ends, arrowprops={"arrowstyle": "-|>", "color": SOFT, "shrinkA": 0, "shrinkB": 0})
+        return chart
 
 
-def _task_box(drawing: Drawing, x: float, middle: float, text: str) -> None:
-    drawing.box(x, middle - 12, 200, 24, "#ffffff")
-    corners = [(x, middle - 12), (x + 200, middle - 12), (x + 200, middle + 12), (x, middle + 12), (x, middle - 12)]
-    drawing.line(corners, _SOFT, 1.2)
-    drawing.text(x + 100, middle + 4, text, "middle")
-
-
-def _arrow_head(drawing: Drawing, x: float, y: float) -> None:
-    drawing.area([(x + 6, y), (x - 3, y - 5), (x - 3, y + 5)], _SOFT, 1)
+def _task_box(axes: Axes, middle: float, height: float, text: str) -> Rectangle:
+    box = Rectangle((middle - 0.85, height - 0.11), 1.7, 0.22, facecolor="white", edgecolor=SOFT)
+    axes.add_patch(box)
+    axes.text(middle, height, text, ha="center", va="center_baseline", size="small")
+    return box
 
 
 # -- kitchens ---------------------------------------------------------------------------------------------------------
 
 
 def boards(best: pd.DataFrame) -> Any:
-    """The layouts shown, each with the cells where the goal is in doubt."""
+    """The layouts shown, each with the cells where the goal is ambiguous."""
     from legible_envs.overcooked import OvercookedLayout
     from legible_envs.overcooked.rendering import draw_ambiguity, draw_side_by_side
     from legible_envs.overcooked.scoring.explanation import ambiguity
@@ -174,7 +171,7 @@ def draw_all(results: tables.Results, folder: Path) -> dict[str, list[Path]]:
         tables.beside_published(tables.metrics_table(results), first),
         {
             "f1, paper": "people of the paper",
-            **{f"f1, {name}": f"{name} people (simulated)" for name in results.walkers},
+            **{f"f1, {name}": f"{name} (simulated)" for name in results.walkers},
         },
         "F1 by condition, the paper's people and ours",
         f"ours: {first}, mean over 10 to 90 % observed",
@@ -194,7 +191,7 @@ def draw_all(results: tables.Results, folder: Path) -> dict[str, list[Path]]:
         "curves": [
             save_figure(
                 folder / f"{slug('learning', name)}.svg",
-                learning_by_condition(results.curves, name, LEGIBLE_FIRST, "walks"),
+                learning_by_condition(results.curves, name, LEGIBLE_FIRST),
             )
             for name in dict.fromkeys(results.curves["predictor"] if len(results.curves) else ())
         ],
@@ -212,15 +209,15 @@ def _accuracy_figures(results: tables.Results, folder: Path) -> list[Path]:
         rows = tables.accuracy_rows(results, walker)
         for predictor in results.predictors:
             each, _ = compare_layouts(rows, predictor)
-            svg = accuracy_by_condition(
+            figure = accuracy_by_condition(
                 each,
                 LEGIBLE_FIRST,
                 float(rows[rows["predictor"] == predictor]["chance"].mean()),
                 f"{predictor}, {walker} people",
                 f"mean over {int(each.means['n'].min())} layouts per condition; bands: Tukey's half-width over layouts",
-                _READ,
+                _NOTE,
             )
-            files.append(save_figure(folder / f"{slug('accuracy', walker, predictor)}.svg", svg))
+            files.append(save_figure(folder / f"{slug('accuracy', walker, predictor)}.svg", figure))
     return files
 
 
@@ -229,6 +226,6 @@ def _confusion_figures(results: tables.Results, best: pd.DataFrame, folder: Path
     walker, predictor = results.walkers[0], results.predictors[0]
     for place in best.to_dict("records"):
         matrix = tables.confusion_of(results, walker, predictor, place["condition"], place["layout"])
-        svg = confusion_figure(matrix, title=f"{place['condition']}: what {predictor} takes for what")
-        files.append(save_figure(folder / f"{slug('confusion', place['condition'])}.svg", svg))
+        figure = confusion_figure(matrix, title=f"{place['condition']}: predictions of {predictor}")
+        files.append(save_figure(folder / f"{slug('confusion', place['condition'])}.svg", figure))
     return files

@@ -3,97 +3,115 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Final
 
-import numpy as np
-
-from predictors.evaluation.figures import COLOURS, Drawing, footnote, heading, round_ticks, save_figure
+from legible_envs.drawing.chart_parts import shares_upwards
+from legible_envs.drawing.charts import COLOURS, INK, RULE, SOFT, Chart, ChartSize, save_figure, styled
 
 if TYPE_CHECKING:
     import pandas as pd
 
 __all__ = ["correlation_figure", "draw_all", "scatter_figure"]
 
-_SOFT, _RULE = "#5d6670", "#e3e6ea"
+_GOALS: Final = {"all": "all in reach"}
+_OF_USE: Final = "of use in the game"
 
 
-def scatter_figure(places: pd.DataFrame, title: str, subtitle: str) -> str:
-    """Accuracy of one predictor against legibility, a dot per stage; kitchens by colour."""
-    width, height, left, top, right, bottom = 720.0, 430.0, 70.0, 66.0, 500.0, 350.0
-    drawing = Drawing(width, height, title, "Accuracy against the legibility of stages.")
-    heading(drawing, title, subtitle)
-    low, high = float(places["score"].min()), float(places["score"].max())
-    low, high = low - 0.06 * (high - low) - 1e-9, high + 0.06 * (high - low) + 1e-9
-    for value in np.linspace(0, 1, 6):
-        y = bottom - value * (bottom - top)
-        drawing.line([(left, y), (right, y)], _RULE if value else _SOFT)
-        drawing.text(left - 9, y + 4, f"{100 * value:.0f} %", "end", fill=_SOFT)
-    for value in round_ticks(low, high):
-        x = left + (value - low) / (high - low) * (right - left)
-        drawing.line([(x, bottom), (x, bottom + 5)], _SOFT)
-        drawing.text(x, bottom + 20, f"{value:g}".replace("-", "\u2212"), "middle", fill=_SOFT)
-    drawing.text((left + right) / 2, bottom + 42, "legibility of the stage (Eq. 2, mean)", "middle")
-    middle = (top + bottom) / 2
-    drawing.text(16, middle, "accuracy", "middle", transform=f"rotate(-90 16 {middle:.1f})")
-    for number, (kitchen, part) in enumerate(places.groupby("kitchen", sort=False)):
-        colour = COLOURS[number % len(COLOURS)]
-        name = str(kitchen).replace("_", " ")
-        for row in part.to_dict("records"):
-            x = left + (row["score"] - low) / (high - low) * (right - left)
-            y = bottom - row["accuracy"] * (bottom - top)
-            drawing.dot(x, y, colour, f"{name}, from {row['start']} to {row['goals']}: {row['walks']} walks")
-        drawing.dot(right + 22, top + 12 + 22 * number, colour, name)
-        drawing.text(right + 34, top + 16 + 22 * number, name, fill=colour, font_weight="600")
-    return drawing.render()
+def scatter_figure(places: pd.DataFrame, title: str, subtitle: str, *, size: ChartSize = "report") -> Chart:
+    """Accuracy of one predictor against legibility, a dot per stage; kitchens by colour.
+
+    Args:
+        places: ``kitchen, start, goals, walks, score, accuracy``, a row per stage.
+        title: Heading.
+        subtitle: Below it.
+        size: See :data:`legible_envs.drawing.charts.SIZES`.
+    """
+    with styled(size):
+        chart = Chart(title, subtitle, description="Accuracy against the legibility of stages.", size=size, height=3.1)
+        axes = chart.subplots()
+        for number, (kitchen, part) in enumerate(places.groupby("kitchen", sort=False)):
+            name = str(kitchen).replace("_", " ")
+            style: dict[str, Any] = {
+                "s": 34,
+                "color": COLOURS[number % len(COLOURS)],
+                "edgecolor": "white",
+                "linewidth": 0.8,
+            }
+            dots = axes.scatter(part["score"], part["accuracy"], clip_on=False, zorder=3, label=name, **style)
+            chart.tip(
+                dots,
+                [
+                    f"{name}, from {row['start']} to {row['goals']}: {row['walks']} trajectories"
+                    for row in part.to_dict("records")
+                ],
+            )
+        shares_upwards(axes)
+        axes.set_ylabel("accuracy")
+        axes.set_xlabel("legibility of the stage (Eq. 2, mean)")
+        axes.legend(loc="upper left", bbox_to_anchor=(1.03, 1.0), labelcolor="markerfacecolor", prop={"weight": "bold"})
+        return chart
 
 
-def correlation_figure(correlations: pd.DataFrame, title: str) -> str:
-    """Rank correlations with their intervals over places, a row per predictor and candidate set."""
+def correlation_figure(correlations: pd.DataFrame, title: str, *, size: ChartSize = "report") -> Chart:
+    """Rank correlations with their intervals over places, a row per predictor and candidate set.
+
+    Args:
+        correlations: ``predictor, candidate_set, places, rho, people_low, people_high, places_low, places_high``.
+        title: Heading.
+        size: See :data:`legible_envs.drawing.charts.SIZES`.
+    """
     rows = correlations.to_dict("records")
-    width, left, top, right, step = 720.0, 250.0, 76.0, 690.0, 26.0
-    height = top + step * len(rows) + 84
-    drawing = Drawing(width, height, title, "Rank correlations with intervals.")
-    heading(drawing, title, "dot: rank correlation; thick: 95 % over people; thin: 95 % over places")
-    bottom = top + step * len(rows)
-
-    def at(value: float) -> float:
-        return left + (value + 1) / 2 * (right - left)
-
-    for value in (-1, -0.5, 0, 0.5, 1):
-        drawing.line([(at(value), top - 8), (at(value), bottom)], _SOFT if value == 0 else _RULE)
-        drawing.text(
-            at(value), bottom + 18, f"{value:+g}".replace("-", "\u2212") if value else "0", "middle", fill=_SOFT
-        )
-    sets = list(dict.fromkeys(row["candidate_set"] for row in rows))
-    for i, row in enumerate(rows):
-        y, colour = top + step * (i + 0.5), COLOURS[sets.index(row["candidate_set"])]
-        goals = "all in reach" if row["candidate_set"] == "all" else "of use in the game"
-        drawing.text(left - 12, y + 4, f"{row['predictor']}, {goals}", "end", fill=colour)
-        drawing.line([(at(row["places_low"]), y), (at(row["places_high"]), y)], colour, 1.4)
-        drawing.line([(at(row["people_low"]), y), (at(row["people_high"]), y)], colour, 5)
-        drawing.dot(at(row["rho"]), y, "#24292f", f"{row['predictor']}: {row['rho']:.2f}")
+    sets = list(dict.fromkeys(correlations["candidate_set"]))
     numbers = " and ".join(
-        f"{int(part['places'].iloc[0])} ({'all in reach' if name == 'all' else 'of use in the game'})"
+        f"{int(part['places'].iloc[0])} ({_GOALS.get(str(name), _OF_USE)})"
         for name, part in correlations.groupby("candidate_set", sort=False)
     )
-    footnote(drawing, f"Places: {numbers}. Goals that count as possible: all in reach, or those of use in the game.")
-    return drawing.render()
+    with styled(size) as own:
+        chart = Chart(
+            title,
+            "dot: rank correlation; thick: 95 % over people; thin: 95 % over places",
+            f"Recorded participants. Places: {numbers}. Possible goals: all in reach, or those of use in the game.",
+            description="Rank correlations with intervals.",
+            size=size,
+            height=0.26 * len(rows) + 0.5,
+        )
+        axes = chart.subplots()
+        for i, row in enumerate(rows):
+            colour = COLOURS[sets.index(row["candidate_set"])]
+            thin, thick = 0.12 * own.text, 0.5 * own.text
+            axes.plot([row["places_low"], row["places_high"]], [i, i], color=colour, linewidth=thin, label="places")
+            axes.plot([row["people_low"], row["people_high"]], [i, i], color=colour, linewidth=thick, label="people")
+            (dot,) = axes.plot(row["rho"], i, "o", color=INK, label="rho", zorder=3)
+            chart.tip(dot, [f"{row['predictor']}: {row['rho']:.2f}"])
+        axes.axvline(0, color=SOFT, linewidth=1, zorder=1)
+        axes.grid(visible=False)
+        axes.grid(visible=True, axis="x", color=RULE)
+        axes.spines[:].set_visible(False)
+        axes.set_xlim(-1, 1)
+        axes.set_xticks([-1, -0.5, 0, 0.5, 1], ["\u22121", "\u22120.5", "0", "+0.5", "+1"])
+        axes.tick_params(length=0)
+        axes.set_ylim(len(rows) - 0.4, -0.6)
+        names = [f"{row['predictor']}, {_GOALS.get(row['candidate_set'], _OF_USE)}" for row in rows]
+        for label, row in zip(axes.set_yticks(range(len(rows)), names), rows, strict=True):
+            label.label1.set_color(COLOURS[sets.index(row["candidate_set"])])
+        return chart
 
 
 def draw_all(stages: pd.DataFrame, correlations: pd.DataFrame, folder: Path) -> list[Path]:
     """Write every figure."""
     files = []
     for level, part in correlations.groupby("level", sort=False):
-        said = "stages" if level == "stage" else "reaches (stage and goal)"
-        svg = correlation_figure(part, f"Legibility and how well recorded people are read: {said}")
-        files.append(save_figure(folder / f"correlations_{level}.svg", svg))
+        said = "stages" if level == "stage" else "stages and goals"
+        figure = correlation_figure(part, f"Legibility and accuracy of predictions: {said}")
+        files.append(save_figure(folder / f"correlations_{level}.svg", figure))
     shown = [name for name in ("Eq. 1", "MaxEnt IRL") if name in set(stages["predictor"])]
     for candidate_set in dict.fromkeys(stages["candidate_set"]):
         goals = "every dispenser in reach" if candidate_set == "all" else "goals of use in the running game"
         for predictor in shown:
             own = stages[(stages["candidate_set"] == candidate_set) & (stages["predictor"] == predictor)]
             if len(own) > 1:
-                svg = scatter_figure(own, f"{predictor}: legible stages and real people", f"a dot per stage; {goals}")
+                title = f"{predictor}: legible stages and recorded participants"
+                figure = scatter_figure(own, title, f"a dot per stage; {goals}")
                 name = predictor.lower().replace(". ", "_").replace(" ", "_")
-                files.append(save_figure(folder / f"stages_{candidate_set}_{name}.svg", svg))
+                files.append(save_figure(folder / f"stages_{candidate_set}_{name}.svg", figure))
     return files

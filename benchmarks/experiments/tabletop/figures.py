@@ -1,4 +1,4 @@
-"""Figures of the experiment: SVG for curves and bars, PNG for tables."""
+"""Figures of the experiment: charts for curves and bars, pictures for tables."""
 
 from __future__ import annotations
 
@@ -8,26 +8,22 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from benchmarks.experiments.conditions import (
-    accuracy_by_condition,
-    bars_by_condition,
-    compare_layouts,
-    learning_by_condition,
-    round_up,
-    slug,
-)
+from benchmarks.experiments.conditions import compare_layouts, slug
+from benchmarks.experiments.figures import accuracy_by_condition, bars_by_condition, learning_by_condition
 from benchmarks.experiments.tabletop import tables
 from benchmarks.experiments.tabletop.sweep import CONDITIONS
-from predictors.evaluation.figures import COLOURS, Drawing, confusion_figure, footnote, heading, save_figure
+from legible_envs.drawing.chart_parts import legend_above, round_upwards
+from legible_envs.drawing.charts import COLOURS, SIZES, Chart, ChartSize, save_figure, styled
+from predictors.evaluation.figures import confusion_figure
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     import pandas as pd
+    from matplotlib.axes import Axes
 
 __all__ = ["boards", "draw_all", "spreads_over_tables", "team_figure"]
 
-_SOFT, _RULE = "#5d6670", "#e3e6ea"
 _RGB: Final = tuple(tuple(int(colour[i : i + 2], 16) for i in (1, 3, 5)) for colour in COLOURS)
 BEST_FIRST: Final = tuple(reversed(CONDITIONS))
 DEVIATIONS: Final = 2.0
@@ -38,7 +34,7 @@ _EVERY: Final = 7
 
 
 def boards(best: pd.DataFrame) -> Any:
-    """The layouts shown, with what is built and where the goal of a reach is in doubt."""
+    """The layouts shown, with what is built and where the goal of a reach is ambiguous."""
     from legible_envs.tabletop import TabletopLayout
     from legible_envs.tabletop.rendering import draw_panels
     from legible_envs.tabletop.settings import read_task
@@ -99,60 +95,50 @@ _PANELS: Final = {
 }
 
 
-def team_figure(teams: pd.DataFrame) -> str:
-    """Means and 95 % intervals of measures by condition, a colour for each way the robot reads people."""
-    readers = list(dict.fromkeys(teams["reader"]))
-    drawing = Drawing(760, 640, "People and robots at work", f"Measures of teams by condition, {', '.join(readers)}.")
-    heading(drawing, "People and robots at work", "means over people and 95 % confidence intervals")
-    x = 16.0
-    for j, reader in enumerate(readers):
-        drawing.box(x, 58, 12, 12, COLOURS[j])
-        drawing.text(x + 18, 68, reader)
-        x += 40 + 7 * len(reader)
-    for i, (measure, title) in enumerate(_PANELS.items()):
-        own = teams[teams["measure"] == measure]
-        if len(own):
-            _panel(drawing, 16 + 248 * (i % 3), 96 + 254 * (i // 3), own, title, readers)
-    footnote(drawing, "Alone: the same people without a robot; they are never idle for want of an object to take.")
-    return drawing.render()
+def team_figure(teams: pd.DataFrame, *, size: ChartSize = "report") -> Chart:
+    """Means and 95 % intervals of measures by condition, a colour for each way the robot predicts goals.
+
+    Args:
+        teams: ``reader, measure, condition, mean, low, high``.
+        size: See :data:`legible_envs.drawing.charts.SIZES`.
+    """
+    predictors = [str(name) for name in dict.fromkeys(teams["reader"])]
+    with styled(size):
+        chart = Chart(
+            "People and robots at work",
+            "means over people and 95 % confidence intervals",
+            "Alone: the same people without a robot; they are never idle for want of an object to take.",
+            description=f"Measures of teams by condition, {', '.join(predictors)}.",
+            size=size,
+            height=5.9,
+        )
+        panels = chart.subplots(3, 2, sharex=True).flat
+        for axes, (measure, title) in zip(panels, _PANELS.items(), strict=True):
+            own = teams[teams["measure"] == measure]
+            if len(own):
+                _panel(chart, axes, own, title, predictors)
+            else:
+                axes.set_axis_off()
+        legend_above(chart, predictors, COLOURS[: len(predictors)])
+        return chart
 
 
-def _panel(drawing: Drawing, left: float, top: float, own: pd.DataFrame, title: str, readers: Sequence[str]) -> None:
-    width, height = 232.0, 150.0
+def _panel(chart: Chart, axes: Axes, own: pd.DataFrame, title: str, predictors: Sequence[str]) -> None:
     is_time = own["measure"].iloc[0] == "completion_time"
-    least = float(own["low"].min()) if is_time else min(0.0, float(own["low"].min()))
-    gap = round_up((float(own["high"].max()) - least) / 5 or 0.2)
-    ticks = np.arange(np.floor(least / gap + 1e-9), np.ceil(float(own["high"].max()) / gap - 1e-9) + 1) * gap
-    low, high = ticks[0], ticks[-1]
-    drawing.text(left + 34, top + 4, title, font_weight="600")
-
-    def y(value: float) -> float:
-        return top + 16 + (high - value) / (high - low) * height
-
-    for value in ticks:
-        drawing.line([(left + 34, y(value)), (left + width, y(value))], _RULE if value else _SOFT)
-        drawing.text(left + 29, y(value) + 4, f"{value:.3g}", "end", fill=_SOFT, font_size=10)
-    step = (width - 34) / len(CONDITIONS)
-    for i, condition in enumerate(CONDITIONS):
-        middle = left + 34 + step * (i + 0.5)
-        for j, reader in enumerate(readers):
-            _interval(drawing, own, reader, condition, middle + 7 * (j - (len(readers) - 1) / 2), y, COLOURS[j])
-        at = f"rotate(-35 {middle:.1f} {top + height + 30:.1f})"
-        drawing.text(middle, top + height + 30, condition, "end", fill=_SOFT, font_size=10, transform=at)
-
-
-def _interval(
-    drawing: Drawing,
-    own: pd.DataFrame,
-    reader: str,
-    condition: str,
-    x: float,
-    y: Callable[[float], float],
-    colour: str,
-) -> None:
-    for row in own[(own["reader"] == reader) & (own["condition"] == condition)].to_dict("records"):
-        drawing.line([(x, y(row["low"])), (x, y(row["high"]))], colour, 1.6)
-        drawing.dot(x, y(row["mean"]), colour, f"{condition}, {reader}: {row['mean']:.3g}")
+    low, high = float(own["low"].min()), float(own["high"].max())
+    round_upwards(axes, low if is_time else min(0.0, low), high)
+    axes.set_title(title, size="small" if chart.get_size_inches()[0] < SIZES["report"].width else "medium")
+    for j, predictor in enumerate(predictors):
+        part = own[own["reader"] == predictor]
+        at = part["condition"].map(CONDITIONS.index) + 0.16 * (j - (len(predictors) - 1) / 2)
+        axes.vlines(at, part["low"], part["high"], color=COLOURS[j], linewidth=1.2)
+        (dots,) = axes.plot(at, part["mean"], "o", color=COLOURS[j], label=predictor)
+        means = part[["condition", "mean"]].itertuples(index=False)
+        chart.tip(dots, [f"{condition}, {predictor}: {mean:.3g}" for condition, mean in means])
+    axes.set_xlim(-0.5, len(CONDITIONS) - 0.5)
+    axes.set_xticks(range(len(CONDITIONS)), CONDITIONS, rotation=30, rotation_mode="anchor", ha="right")
+    axes.tick_params(axis="x", length=0)
+    axes.tick_params(labelsize="small")
 
 
 # -- all of them ------------------------------------------------------------------------------------------------------
@@ -193,7 +179,7 @@ def draw_all(results: tables.Results, folder: Path) -> dict[str, list[Path]]:
         "curves": [
             save_figure(
                 folder / f"{slug('learning', name)}.svg",
-                learning_by_condition(results.curves, name, BEST_FIRST, "reaches"),
+                learning_by_condition(results.curves, name, BEST_FIRST),
             )
             for name in dict.fromkeys(results.curves["predictor"])
         ],
@@ -205,14 +191,14 @@ def _accuracy_figures(results: tables.Results, folder: Path) -> list[Path]:
     files, rows = [], tables.accuracy_rows(results)
     for predictor in results.predictors:
         each, _ = compare_layouts(rows, predictor)
-        svg = accuracy_by_condition(
+        figure = accuracy_by_condition(
             each,
             BEST_FIRST,
             float(rows[rows["predictor"] == predictor]["chance"].mean()),
-            f"Goals read correctly: {predictor}",
+            f"Goals predicted correctly: {predictor}",
             f"mean over {int(each.means['n'].min())} layouts per condition; bands: Tukey's half-width over layouts",
         )
-        files.append(save_figure(folder / f"{slug('accuracy', predictor)}.svg", svg))
+        files.append(save_figure(folder / f"{slug('accuracy', predictor)}.svg", figure))
     return files
 
 
@@ -220,6 +206,6 @@ def _confusion_figures(results: tables.Results, best: pd.DataFrame, folder: Path
     files, predictor = [], results.predictors[0]
     for place in best.to_dict("records"):
         matrix = tables.confusion_of(results, predictor, place["condition"], place["layout"])
-        svg = confusion_figure(matrix, title=f"{place['condition']}: what the {predictor} takes for what")
-        files.append(save_figure(folder / f"{slug('confusion', place['condition'])}.svg", svg))
+        figure = confusion_figure(matrix, title=f"{place['condition']}: predictions of the {predictor}")
+        files.append(save_figure(folder / f"{slug('confusion', place['condition'])}.svg", figure))
     return files
