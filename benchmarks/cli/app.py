@@ -266,7 +266,7 @@ def score(
     trajectories in the --trajectories file, and writes tables, figures and a page into the --out folder; where LAYOUT
     is the folder of a search, into its people folder, and a section into its report.
     """
-    from benchmarks.cli.layouts import print_predictions, score_lines, trajectories_in
+    from benchmarks.cli.layouts import print_predictions, save_evaluation, score_lines, trajectories_in
     from benchmarks.presenters.registry import load_design
 
     given = [
@@ -288,7 +288,7 @@ def score(
     if not predictors:
         print_predictions(say(), design, trajectories)
         return
-    from benchmarks.reports.prediction_report import evaluate_trajectories, print_evaluation, save_evaluation
+    from benchmarks.reports.prediction_report import evaluate_trajectories, print_evaluation
 
     recorded = trajectories_in(design, trajectories)
     results = evaluate_trajectories(recorded, predictors, groups="participant" if by_participant else None, **settings)

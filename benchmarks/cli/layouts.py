@@ -13,9 +13,10 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from benchmarks.presenters.base import Design
+    from benchmarks.reports.prediction_report import PredictionResults
     from legible_envs.rollouts.trajectory import Trajectory
 
-__all__ = ["print_predictions", "score_lines", "show_design", "trajectories_in"]
+__all__ = ["print_predictions", "save_evaluation", "score_lines", "show_design", "trajectories_in"]
 
 WORST_ROWS, BEST_ROWS = 10, 3
 """Rows of the tables of losses and gains that the terminal shows."""
@@ -98,3 +99,26 @@ def trajectories_in(design: Design, file: Path) -> list[Trajectory]:
         about = f" (layout id {named})" if named is not None else ""
         raise ValueError(f"{file} has no trajectory recorded on this {design.noun}{about}")
     return recorded
+
+
+def save_evaluation(results: PredictionResults, layout: str, out: Path | None) -> list[str]:
+    """Write results into ``out``, or into the folder and report of a run, and say where.
+
+    Args:
+        results: What :func:`.evaluate_trajectories` found.
+        layout: The layout as the command line names it; may be a run's folder.
+        out: The folder to write into; None takes the run's, and writes nothing without a run.
+    """
+    from benchmarks.reports.prediction_report import FOLDER, write_evaluation
+    from benchmarks.reports.search_report import write_report
+    from optimizers import is_run_folder
+
+    is_run = layout != "-" and is_run_folder(layout)
+    if out is None and not is_run:
+        return []
+    folder = out or Path(layout) / FOLDER
+    write_evaluation(results, folder)
+    lines = [f"tables, figures, page: {folder}"]
+    if out is None:
+        lines.append(f"report: {write_report(layout)}")
+    return lines

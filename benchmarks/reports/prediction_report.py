@@ -27,7 +27,6 @@ __all__ = [
     "evaluate_trajectories",
     "evaluation_section",
     "print_evaluation",
-    "save_evaluation",
     "write_evaluation",
 ]
 
@@ -210,28 +209,6 @@ def write_evaluation(results: PredictionResults, folder: Path, *, title: str = "
     written.append(_write(folder / _FILE, json.dumps(_about(results), indent=1)))
     written.append(_write(folder / "report.html", _page(folder, title)))
     return written
-
-
-def save_evaluation(results: PredictionResults, layout: str, out: Path | None) -> list[str]:
-    """Write results into ``out``, or into the folder and report of a run, and say where.
-
-    Args:
-        results: What :func:`evaluate_trajectories` found.
-        layout: The layout as the command line names it; may be a run's folder.
-        out: The folder to write into; None takes the run's, and writes nothing without a run.
-    """
-    from benchmarks.reports.search_report import write_report
-    from optimizers import is_run_folder
-
-    is_run = layout != "-" and is_run_folder(layout)
-    if out is None and not is_run:
-        return []
-    folder = out or Path(layout) / FOLDER
-    write_evaluation(results, folder)
-    lines = [f"tables, figures, page: {folder}"]
-    if out is None:
-        lines.append(f"report: {write_report(layout)}")
-    return lines
 
 
 def _write(path: Path, text: str) -> Path:

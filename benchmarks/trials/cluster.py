@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Iterator
 from typing import Any
 
-from benchmarks.trials.running import Outcome, run_one
+from benchmarks.trials.attempts import Outcome, run_one
 from benchmarks.trials.store import Trial
 from optimizers.evaluator import connect
 
@@ -37,7 +37,7 @@ class ClusterPool:
         self._queue: deque[tuple[int, Trial]] = deque()
 
     def run(self, function: str, trials: Iterator[tuple[int, Trial]]) -> Iterator[Outcome | dict[str, Trial]]:
-        """See :class:`~benchmarks.trials.running.Pool`."""
+        """See :class:`~benchmarks.trials.attempts.Pool`."""
         from distributed import wait
 
         self._queue.extend(trials)
@@ -60,7 +60,7 @@ class ClusterPool:
             self._client.close()
 
     def again(self, number: int, trial: Trial) -> None:
-        """See :class:`~benchmarks.trials.running.Pool`."""
+        """See :class:`~benchmarks.trials.attempts.Pool`."""
         self._queue.append((number, trial))
 
     def _submit(self, function: str, running: dict[Any, tuple[int, Trial]]) -> None:

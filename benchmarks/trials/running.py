@@ -2,40 +2,21 @@
 
 from __future__ import annotations
 
-import time
-import traceback
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Final
 
-from benchmarks.trials.functions import name_of, path_of, resolve
-from benchmarks.trials.store import Rows, Trial, TrialStore, plain
+from benchmarks.trials.attempts import Outcome, Pool
+from benchmarks.trials.functions import name_of, path_of
+from benchmarks.trials.store import Trial, TrialStore
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Event", "Outcome", "Pool", "TrialsFailed", "run_one", "run_trials"]
+__all__ = ["Event", "TrialsFailed", "run_trials"]
 
 ATTEMPTS: Final = 2
-
-
-class Outcome(NamedTuple):
-    """How one attempt at a trial ended; either ``rows`` or ``error`` is set.
-
-    Attributes:
-        number: Index of the trial.
-        rows: Its result rows.
-        error: Its traceback, or how its worker was lost.
-        seconds: How long it took.
-        worker: Which worker ran it.
-    """
-
-    number: int
-    rows: Rows | None
-    error: str | None
-    seconds: float
-    worker: str
 
 
 @dataclass
@@ -73,16 +54,6 @@ class TrialsFailed(RuntimeError):
         super().__init__(message)
         self.failures = failures
         self.table = table
-
-
-class Pool(Protocol):
-    """What runs trials: it takes them one by one and yields outcomes as they come."""
-
-    def run(self, function: str, trials: Iterator[tuple[int, Trial]]) -> Iterator[Outcome | dict[str, Trial]]:
-        """Outcomes in any order; between them, mappings of worker to trial whenever that changes."""
-
-    def again(self, number: int, trial: Trial) -> None:
-        """Put a trial back at the end of the queue."""
 
 
 def run_trials(
@@ -184,14 +155,3 @@ def _pool(workers: int | None, scheduler: str | None, num_trials: int) -> Pool:
     if count < 1:
         raise ValueError(f"workers must be at least 1, got {workers}")
     return InProcess() if count == 1 else LocalPool(min(count, num_trials))
-
-
-def run_one(function: str, number: int, trial: Trial, worker: str) -> Outcome:
-    """One attempt at one trial, in the process that calls this."""
-    started = time.perf_counter()
-    rows, error = None, None
-    try:
-        rows = plain(resolve(function)(dict(trial)))
-    except Exception:
-        error = traceback.format_exc()
-    return Outcome(number, rows, error, time.perf_counter() - started, worker)

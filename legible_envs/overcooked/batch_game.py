@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -12,10 +12,30 @@ from legible_envs.overcooked.game.vectors import Kitchen, Vector
 from legible_envs.overcooked.game.view import GameView
 from legible_envs.overcooked.layout import OvercookedLayout
 
-if TYPE_CHECKING:
-    from legible_envs.overcooked.vector_env import OvercookedVectorEnv
+__all__ = ["GameOfBatch", "Games"]
 
-__all__ = ["GameOfBatch"]
+
+class Games(Protocol):
+    """What a batch tells of each of its games; :class:`.OvercookedVectorEnv` is one."""
+
+    single_action_space: Any
+    single_observation_space: Any
+    render_mode: str | None
+
+    def layout(self, index: int) -> OvercookedLayout:
+        """The kitchen of a game."""
+
+    def generator(self, index: int) -> tuple[np.random.Generator, int]:
+        """The random generator of a game and its seed."""
+
+    def goals(self, index: int) -> tuple[str, ...]:
+        """Names of the valid goals of a game."""
+
+    def view(self, index: int) -> GameView:
+        """A snapshot of a game."""
+
+    def arrays(self, index: int) -> tuple[Vector, Kitchen, Vector]:
+        """State, kitchen and rules of a game; not copies."""
 
 
 class GameOfBatch:
@@ -26,7 +46,7 @@ class GameOfBatch:
         index: Number of the game.
     """
 
-    def __init__(self, envs: OvercookedVectorEnv, index: int) -> None:
+    def __init__(self, envs: Games, index: int) -> None:
         self._envs = envs
         self._index = index
 

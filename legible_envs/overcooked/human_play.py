@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import gymnasium as gym
 import numpy as np
@@ -22,7 +22,7 @@ from legible_envs.support.files import write_npz
 if TYPE_CHECKING:
     from legible_envs.rollouts.trajectory import Trajectory
 
-__all__ = ["Played", "load_played", "play", "read_played", "recipes_for"]
+__all__ = ["Played", "load_played", "play", "read_played", "recipes_for", "trajectories_from_played"]
 
 ENV_ID: Final = "LegibleOvercooked-v0"
 STAY: Final = 4
@@ -120,13 +120,45 @@ def read_played(path: Path) -> list[Trajectory] | None:
         OSError: No such file.
         ValueError: The recording belongs to another version of the game.
     """
-    from legible_envs.overcooked.trajectories import trajectories_from_played
-
     try:
         played = load_played(path)
     except ValueError:
         return None
     return trajectories_from_played(played, participant=path.stem)
+
+
+def trajectories_from_played(
+    played: Played, *, candidate_set: Literal["game", "all"] = "game", **labels: Any
+) -> list[Trajectory]:
+    """The trajectories in what ``legible play --record`` wrote, by playing its actions again.
+
+    Args:
+        played: As of :func:`load_played`.
+        candidate_set: Whether the candidates are the goals valid in the running game or all in reach.
+        labels: Further arguments of ``OvercookedEnv.trajectories``: ``participant``, ``condition``, ….
+
+    Raises:
+        ValueError: The actions do not give the recorded rewards: the recording is of another version of the game.
+    """
+    env = played.make_env()
+    game: Any = env.unwrapped
+    found: list[Trajectory] = []
+    try:
+        current = None
+        for number, (action, episode) in enumerate(zip(played.actions, played.episodes, strict=True)):
+            if episode != current:
+                found += game.trajectories(candidate_set=candidate_set, **labels)
+                env.reset(seed=played.seed if current is None else None)
+                current = episode
+            _, reward, *_ = env.step(int(action))
+            if not np.isclose(float(reward), played.rewards[number]):
+                raise ValueError(
+                    f"step {number} was recorded with reward {played.rewards[number]:g} and gives {float(reward):g} "
+                    "now; the recording belongs to another version of the game"
+                )
+        return found + game.trajectories(candidate_set=candidate_set, **labels)
+    finally:
+        env.close()
 
 
 def recipes_for(layout: OvercookedLayout) -> tuple[Recipe, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +18,6 @@ from legible_envs.rollouts.trajectory import Trajectory
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from legible_envs.overcooked.human_play import Played
 
 __all__ = [
     "ValidGoals",
@@ -26,7 +25,6 @@ __all__ = [
     "dispensers_in_reach",
     "find_walks",
     "trajectories",
-    "trajectories_from_played",
     "trajectories_from_states",
     "trajectories_from_views",
 ]
@@ -266,37 +264,3 @@ def trajectories_from_views(
 
 def _station_beside(layout: OvercookedLayout, cell: Sequence[int]) -> str | None:
     return next((n for n in layout.named("serving") if (int(cell[0]), int(cell[1])) in layout.access(n)), None)
-
-
-def trajectories_from_played(
-    played: Played, *, candidate_set: Literal["game", "all"] = "game", **labels: Any
-) -> list[Trajectory]:
-    """The trajectories in what ``legible play --record`` wrote, by playing its actions again.
-
-    Args:
-        played: As of :func:`legible_envs.overcooked.human_play.load_played`.
-        candidate_set: Whether the candidates are the goals valid in the running game or all in reach.
-        labels: Further arguments of ``OvercookedEnv.trajectories``: ``participant``, ``condition``, ….
-
-    Raises:
-        ValueError: The actions do not give the recorded rewards: the recording is of another version of the game.
-    """
-    env = played.make_env()
-    game: Any = env.unwrapped
-    found: list[Trajectory] = []
-    try:
-        current = None
-        for number, (action, episode) in enumerate(zip(played.actions, played.episodes, strict=True)):
-            if episode != current:
-                found += game.trajectories(candidate_set=candidate_set, **labels)
-                env.reset(seed=played.seed if current is None else None)
-                current = episode
-            _, reward, *_ = env.step(int(action))
-            if not np.isclose(float(reward), played.rewards[number]):
-                raise ValueError(
-                    f"step {number} was recorded with reward {played.rewards[number]:g} and gives {float(reward):g} "
-                    "now; the recording belongs to another version of the game"
-                )
-        return found + game.trajectories(candidate_set=candidate_set, **labels)
-    finally:
-        env.close()

@@ -30,15 +30,23 @@ from legible_envs.layout_kinds import LayoutKind, kind_named, kind_of
 from legible_envs.rollouts.trajectory import Trajectory
 from legible_envs.support.files import write_npz
 
-__all__ = ["SCHEMA", "read", "write"]
+__all__ = ["SCHEMA", "load_trajectories", "save_trajectories"]
 
 SCHEMA: Final = 3
 _KIND: Final = "legible-envs trajectories"
 _TEXTS: Final = ("start", "goal", "candidates", "participant", "condition", "layout_name", "candidate_set", "complete")
 
 
-def write(path: str | os.PathLike[str], trajectories: Iterable[Trajectory]) -> Path:
-    """See :func:`legible_envs.rollouts.save_trajectories`."""
+def save_trajectories(path: str | os.PathLike[str], trajectories: Iterable[Trajectory]) -> Path:
+    """Write trajectories to one ``.npz``, all or nothing; no pickles.
+
+    Returns:
+        The path written.
+
+    Raises:
+        ValueError: Cells and positions, or different dimensions, in one file; a layout of no registered kind.
+        OSError: The file cannot be written; an earlier file is untouched.
+    """
     trajectories = list(trajectories)
     # Empty prefixes have no positions that could be of another kind.
     forms = {(each.states.shape[1], each.states.dtype) for each in trajectories if each.num_states}
@@ -84,8 +92,13 @@ def _least_schema(kinds: Iterable[LayoutKind], records: Iterable[dict[str, Any]]
     return max([positions, *(kind.schema for kind in kinds)])
 
 
-def read(path: str | os.PathLike[str]) -> list[Trajectory]:
-    """See :func:`legible_envs.rollouts.load_trajectories`."""
+def load_trajectories(path: str | os.PathLike[str]) -> list[Trajectory]:
+    """Read trajectories back, equal to those saved and in their order.
+
+    Raises:
+        FileNotFoundError: No such file.
+        ValueError: Not a file of trajectories, damaged, of a newer schema, or with layouts of a kind that is not known.
+    """
     name = os.fspath(path)
     try:
         with np.load(path, allow_pickle=False) as file:

@@ -11,7 +11,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
-from legible_envs.rollouts.trajectory import Trajectory, load_trajectories
+from legible_envs.rollouts.npz_files import load_trajectories
+from legible_envs.rollouts.trajectory import Trajectory
 from legible_envs.support.plugins import Registry
 
 __all__ = ["TrajectoryFormat", "read_any", "register_trajectory_format"]

@@ -6,8 +6,7 @@ observer may know beforehand: where the person started, and which goals are poss
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, Literal
@@ -16,9 +15,9 @@ import numpy as np
 import numpy.typing as npt
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    pass
 
-__all__ = ["CUTS", "Cut", "Trajectory", "load_trajectories", "save_trajectories"]
+__all__ = ["CUTS", "Cut", "Trajectory"]
 
 Cut = Literal["steps", "cells", "time", "arc"]
 CandidateSet = Literal["task", "game", "all"]
@@ -281,33 +280,3 @@ _CUTTERS: Final[dict[str, Callable[[Trajectory, float], int]]] = {
     "time": _cut_time,
     "arc": _cut_arc,
 }
-
-
-# -- files ------------------------------------------------------------------------------------------------------------
-
-
-def save_trajectories(path: str | os.PathLike[str], trajectories: Iterable[Trajectory]) -> Path:
-    """Write trajectories to one ``.npz``, all or nothing; no pickles. See :mod:`legible_envs.rollouts.npz_files`.
-
-    Returns:
-        The path written.
-
-    Raises:
-        ValueError: Cells and positions, or different dimensions, in one file; a layout of no registered kind.
-        OSError: The file cannot be written; an earlier file is untouched.
-    """
-    from legible_envs.rollouts.npz_files import write
-
-    return write(path, trajectories)
-
-
-def load_trajectories(path: str | os.PathLike[str]) -> list[Trajectory]:
-    """Read trajectories back, equal to those saved and in their order.
-
-    Raises:
-        FileNotFoundError: No such file.
-        ValueError: Not a file of trajectories, damaged, of a newer schema, or with layouts of a kind that is not known.
-    """
-    from legible_envs.rollouts.npz_files import read
-
-    return read(path)

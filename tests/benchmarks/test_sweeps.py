@@ -58,7 +58,7 @@ def test_every_combination_is_one_trial() -> None:
         ({"seeds": []}, "empty"),
         ({"predictors": ["crystal-ball"]}, "crystal-ball"),
         ({"people": 3}, "must be a table"),
-        ({"predictors": ["bayesian"], "people": {"walker": "nobody"}}, "people of .*walker must be one of"),
+        ({"predictors": ["bayesian"], "people": {"population": "nobody"}}, "people of .*`population` must be one of"),
         (
             {"workspaces": ["overcooked", "tabletop"], "predictors": ["bayesian"]},
             "'bayesian', people of workspace 'tabletop' .*is for trajectories in kitchens",

@@ -79,7 +79,7 @@ def fetch_recordings(
     from legible_envs.datasets.overcooked_2019.source import SHA256, download_archive, read_archive, read_members
     from legible_envs.datasets.overcooked_2019.trajectories import all_trajectories
     from legible_envs.datasets.overcooked_2019.unpickle import read_table
-    from legible_envs.rollouts.trajectory import save_trajectories
+    from legible_envs.rollouts.npz_files import save_trajectories
 
     place = recordings_folder(folder)
     if source is None and not force and _is_there(place):

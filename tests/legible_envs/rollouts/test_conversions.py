@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 
 import legible_envs  # noqa: F401
 from legible_envs.errors import LayoutError
-from legible_envs.overcooked.human_play import Played
+from legible_envs.overcooked.human_play import Played, trajectories_from_played
 from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.overcooked.policies import ScriptedPlayer
-from legible_envs.overcooked.trajectories import trajectories_from_played, trajectories_from_views
+from legible_envs.overcooked.trajectories import trajectories_from_views
 from legible_envs.rollouts import (
     RecordTrajectories,
     Trajectory,
