@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -29,6 +29,11 @@ from legible_envs.overcooked.settings import KitchenSettings, PackedKitchen, cou
 from legible_envs.support.specs import JsonSpec, check_options
 
 __all__ = ["OvercookedVectorEnv"]
+
+_MARKS: Final = tuple(
+    f"_{key}" for key in ("goal_mask", "action_mask", "layout_id", "num_done", "deliveries", "crossings")
+)
+"""For each key of infos, the one that says which games have it; as in ``SyncVectorEnv``."""
 
 Infos = dict[str, Any]
 
@@ -401,7 +406,9 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
             for key, values in infos.items():
                 values[~which] = None if key == "layout_id" else 0
         told = self._everyone if which is None else which
-        infos |= {"_" + key: told.copy() for key in infos}
+        marks = np.empty((len(_MARKS), len(told)), dtype=np.bool_)
+        marks[:] = told
+        infos.update(zip(_MARKS, marks, strict=True))
         return infos
 
     def _finish(self, done: npt.NDArray[np.bool_], masks: npt.NDArray[np.int8]) -> Infos:
