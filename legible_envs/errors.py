@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from legible_envs.support.contracts import ContractError
+
 __all__ = ["LayoutError", "TaskError", "WorkspaceError"]
 
 
@@ -30,16 +32,9 @@ class TaskError(ValueError):
     """A task graph is malformed: a cycle, an unknown name, or no valid sequence."""
 
 
-class WorkspaceError(ValueError):
+class WorkspaceError(ContractError):
     """A workspace breaks the contract of :class:`~legible_envs.workspace.Workspace`.
 
     Attributes:
         problems: One sentence for each problem.
     """
-
-    def __init__(self, message: str, problems: tuple[str, ...] = ()) -> None:
-        super().__init__(message)
-        self.problems = problems
-
-    def __reduce__(self) -> tuple[object, ...]:
-        return WorkspaceError, (str(self), self.problems)

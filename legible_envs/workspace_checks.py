@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import pickle
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from legible_envs.errors import LayoutError, WorkspaceError
+from legible_envs.support.contracts import find_problems, refuse
 from legible_envs.workspace import Workspace, make_workspace
 
 __all__ = ["check_workspace"]
@@ -33,22 +35,9 @@ def check_workspace(workspace: Workspace, *, seed: int = 0) -> None:
     """
     if not isinstance(workspace, Workspace):
         raise WorkspaceError(f"expected a Workspace, got {type(workspace).__name__}", problems=("not a Workspace",))
-    problems: list[str] = []
-    before = _global_random_state()
-    for check in (_genomes, _variation, _scores, _one_layout, _configuration):
-        try:
-            problems += check(workspace, seed)
-        except Exception as error:
-            problems.append(f"{check.__name__.strip('_')}: raised {type(error).__name__}: {error}")
-    if _global_random_state() != before:
-        problems.append("it draws from numpy's global random state; use only the generator it is given")
-    if problems:
-        listed = "\n".join(f"- {problem}" for problem in problems)
-        raise WorkspaceError(f"{type(workspace).__name__} breaks the workspace contract:\n{listed}", tuple(problems))
-
-
-def _global_random_state() -> bytes:
-    return pickle.dumps(np.random.get_state())  # noqa: NPY002 - watched, not used
+    checks = (_genomes, _variation, _scores, _one_layout, _configuration)
+    found = find_problems({check.__name__.strip("_"): partial(check, workspace, seed) for check in checks})
+    refuse(workspace, "workspace", found, WorkspaceError)
 
 
 def _rng(seed: int) -> np.random.Generator:

@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, Final
 
 from legible_envs.rollouts.trajectory import Trajectory
+from legible_envs.support.contracts import ContractError, refuse
 from legible_envs.support.plugins import Plugin, Registry
 from predictors.base import GoalPredictor
 
@@ -34,8 +35,12 @@ PredictorSpec = str | Callable[..., GoalPredictor] | GoalPredictor
 PredictorInfo = Plugin
 
 
-class PredictorError(ValueError):
-    """A predictor cannot be found or made, or breaks the contract."""
+class PredictorError(ContractError):
+    """A predictor cannot be found or made, or breaks the contract.
+
+    Attributes:
+        problems: One sentence for each thing that :func:`check_predictor` found wrong; empty for other errors.
+    """
 
 
 BUILT_IN: Final = {
@@ -106,13 +111,9 @@ def check_predictor(spec: PredictorSpec, X: Sequence[Trajectory] | None = None, 
         parameters: Its parameters.
 
     Raises:
-        PredictorError: Listing everything that is wrong.
+        PredictorError: Something is wrong; ``problems`` lists each in a sentence.
     """
     from predictors.checks import find_problems
 
     predictor = make_predictor(spec, **parameters)
-    problems = find_problems(predictor, X)
-    if problems:
-        raise PredictorError(
-            f"{type(predictor).__name__} breaks the contract:\n" + "\n".join(f"- {p}" for p in problems)
-        )
+    refuse(predictor, "predictor", find_problems(predictor, X), PredictorError)

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import io
 import json
-import pickle
 from collections.abc import Iterator, Mapping
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
 
 from benchmarks.presenters.base import Presenter, ReportTexts, text_of
 from benchmarks.presenters.registry import presenter_of
+from legible_envs.support.contracts import ContractError, find_problems, refuse
 from legible_envs.workspace import Workspace, make_workspace
 
 __all__ = ["PresenterError", "check_presenter"]
@@ -31,19 +32,12 @@ _ROOM: Final = 100_000
 LAYOUTS: Final = 4
 
 
-class PresenterError(ValueError):
+class PresenterError(ContractError):
     """A presenter breaks the contract of :class:`~benchmarks.presenters.Presenter`.
 
     Attributes:
         problems: One sentence for each problem.
     """
-
-    def __init__(self, message: str, problems: tuple[str, ...] = ()) -> None:
-        super().__init__(message)
-        self.problems = problems
-
-    def __reduce__(self) -> tuple[object, ...]:
-        return PresenterError, (str(self), self.problems)
 
 
 def check_presenter(presenter: Presenter | str, workspace: Workspace | None = None, *, seed: int = 0) -> None:
@@ -65,25 +59,12 @@ def check_presenter(presenter: Presenter | str, workspace: Workspace | None = No
         presenter = presenter_of(presenter)
     if not isinstance(presenter, Presenter):
         raise PresenterError(f"expected a Presenter, got {type(presenter).__name__}", ("not a Presenter",))
-    problems: list[str] = []
-    before = _global_random_state()
     if workspace is None:
         workspace = make_workspace(presenter.name)
     genomes = workspace.sample(LAYOUTS, np.random.default_rng(seed))
-    for check in (_names, _terminal, _page, _reading, _settings):
-        try:
-            problems += check(presenter, workspace, genomes)
-        except Exception as error:
-            problems.append(f"{check.__name__.strip('_')}: raised {type(error).__name__}: {error}")
-    if _global_random_state() != before:
-        problems.append("it draws from numpy's global random state")
-    if problems:
-        listed = "\n".join(f"- {problem}" for problem in problems)
-        raise PresenterError(f"{type(presenter).__name__} breaks the presenter contract:\n{listed}", tuple(problems))
-
-
-def _global_random_state() -> bytes:
-    return pickle.dumps(np.random.get_state())  # noqa: NPY002 - watched, not used
+    checks = (_names, _terminal, _page, _reading, _settings)
+    tried = {check.__name__.strip("_"): partial(check, presenter, workspace, genomes) for check in checks}
+    refuse(presenter, "presenter", find_problems(tried), PresenterError)
 
 
 def _names(presenter: Presenter, workspace: Workspace, genomes: Any) -> Iterator[str]:
