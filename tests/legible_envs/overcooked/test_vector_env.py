@@ -189,8 +189,8 @@ def test_rendering_is_the_same(render_mode):
         np.testing.assert_array_equal(a, b)
 
 
-def test_a_window_shows_all_games(monkeypatch):
-    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+@pytest.mark.usefixtures("no_screen")
+def test_a_window_shows_all_games():
     envs = gym.make_vec(NAME, num_envs=3, vectorization_mode="vector_entry_point", render_mode="human")
     envs.metadata["render_fps"] = 1000
     envs.reset(seed=0)
