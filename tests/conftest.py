@@ -1,4 +1,4 @@
-"""What all tests share: the recorded games that some need, and the example package that others install.
+"""What all tests share: recorded games that some need, registries that some fill, a package that some install.
 
 ``LEGIBLE_REQUIRE_DATA=1`` turns the skips of tests marked ``data`` into failures, so that none stays out unseen.
 """
@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -14,11 +15,12 @@ import pytest
 
 from tests.support.example_package import install
 
+PACKAGES = ("legible_envs", "optimizers", "predictors", "benchmarks")
 EXAMPLES = Path(__file__).parent.parent / "docs" / "examples"
 
 
 @cache
-def _missing_recordings() -> str:
+def missing_recordings() -> str:
     """Why the recorded games cannot be read; empty where they can."""
     from legible_envs.datasets.overcooked_2019 import RecordingsError, load_recorded_games
 
@@ -31,11 +33,21 @@ def _missing_recordings() -> str:
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """Skip what needs recorded games where there are none, or fail where they are required."""
-    if item.get_closest_marker("data") is None or not (reason := _missing_recordings()):
+    if item.get_closest_marker("data") is None or not (reason := missing_recordings()):
         return
     if os.environ.get("LEGIBLE_REQUIRE_DATA", "0") not in ("", "0"):
         pytest.fail(f"LEGIBLE_REQUIRE_DATA is set, but {reason}", pytrace=False)
     pytest.skip(reason)
+
+
+@pytest.fixture
+def clean_registries(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Plug-ins that a test registers are known to it alone; built-in and installed ones stay."""
+    from legible_envs.support.plugins import Registry
+
+    modules = [vars(module) for name, module in sys.modules.items() if name.partition(".")[0] in PACKAGES]
+    for registry in (found for names in modules for found in list(names.values()) if isinstance(found, Registry)):
+        monkeypatch.setattr(registry, "_registered", {})
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ NEEDS_NONE = SimpleNamespace(get_closest_marker=lambda name: None)
 @pytest.fixture
 def _no_recordings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("LEGIBLE_DATA", str(tmp_path))
-    monkeypatch.setattr(conftest, "_missing_recordings", conftest._missing_recordings.__wrapped__)
+    monkeypatch.setattr(conftest, "missing_recordings", conftest.missing_recordings.__wrapped__)
 
 
 @pytest.mark.usefixtures("_no_recordings")

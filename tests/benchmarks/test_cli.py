@@ -12,12 +12,12 @@ from pathlib import Path
 import click
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
 
 from benchmarks.cli.app import CONTENTS, main
 from benchmarks.presenters.overcooked import load_kitchen
 from legible_envs import __version__
 from legible_envs.overcooked import OvercookedLayout, OvercookedWorkspace
+from tests.support.command_line import legible, values
 from tests.support.run_folders import write_run
 
 KITCHEN = """\
@@ -30,16 +30,6 @@ X     X
 XXDXSXX
 """
 OVERCOOKED_AI = '{\n"grid": """XXPXX\n            O  2O\n            X1  X\n            XDXSX""",\n"cook_time": 20\n}\n'
-
-
-def legible(*arguments: str | Path, text: str | None = None) -> Result:
-    return CliRunner().invoke(main, [str(a) for a in arguments], input=text)
-
-
-def values(result: Result) -> dict[str, str]:
-    """The lines ``name  value`` of ``legible score``."""
-    pairs = [line.split("  ", 1) for line in result.output.splitlines() if "  " in line]
-    return {name: value.strip() for name, value in pairs}
 
 
 @pytest.fixture(scope="module")

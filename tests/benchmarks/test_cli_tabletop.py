@@ -5,30 +5,19 @@ from __future__ import annotations
 import json
 import shutil
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
 from PIL import Image
 
-from benchmarks.cli.app import main
 from benchmarks.presenters.tabletop_panels import CONDITIONS, panels_of
 from legible_envs.tabletop import TabletopLayout, TabletopTask, VirtualObstacle
 from legible_envs.tabletop.design.workspace import TabletopWorkspace
 from legible_envs.tabletop.scoring.scorer import TabletopScorer
 from optimizers import load_run
+from tests.support.command_line import legible, page_data, values
 
 SMALL = ("--evaluations", 1200, "--quiet", "--emitter", "improve")
-
-
-def legible(*arguments: str | Path | int, text: str | None = None) -> Result:
-    return CliRunner().invoke(main, [str(a) for a in arguments], input=text)
-
-
-def values(result: Result) -> dict[str, str]:
-    pairs = [line.split("  ", 1) for line in result.output.splitlines() if "  " in line]
-    return {name: value.strip() for name, value in pairs}
 
 
 @pytest.fixture(scope="module")
@@ -38,11 +27,6 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     result = legible("optimize", "tabletop", *SMALL, "--seed", 3, "--out", folder)
     assert result.exit_code == 0, result.output
     return folder
-
-
-def page_data(folder: Path) -> Any:
-    text = (folder / "report.html").read_text(encoding="utf-8")
-    return json.loads(text.split('<script type="application/json" id="data">')[1].split("</script>")[0])
 
 
 # -- searches ----------------------------------------------------------------------------------------------------------

@@ -19,22 +19,16 @@ from benchmarks.presenters import (
     presenter_of,
     register_presenter,
 )
-from benchmarks.presenters import registry as presenter_registry
 from benchmarks.presenters.losses import loss_row
-from legible_envs import workspace as workspace_module
 from legible_envs.errors import LayoutError
 from legible_envs.overcooked import OvercookedWorkspace
 from legible_envs.workspace import register_workspace
 from tests.support.shelf_workspace import ShelfWorkspace
 
+pytestmark = pytest.mark.usefixtures("clean_registries")
+
 SHELF = "tests.support.shelf_workspace:ShelfWorkspace"
 KITCHEN = "XTXPXXX\nX     O\nX V   X\nC     X\nX   V F\nX     X\nXXDXSXX\n"
-
-
-@pytest.fixture(autouse=True)
-def _clean_registries(monkeypatch: pytest.MonkeyPatch) -> None:
-    for registry in (presenter_registry._registry, workspace_module._registry):
-        monkeypatch.setattr(registry, "_registered", {})
 
 
 @pytest.mark.parametrize("name", ["overcooked", "tabletop", SHELF, "aisle"])
@@ -91,7 +85,7 @@ class Shelves(Presenter):
 
 
 @pytest.fixture
-def shelf(monkeypatch: pytest.MonkeyPatch) -> None:
+def shelf(clean_registries: None) -> None:
     register_workspace("shelf", ShelfWorkspace)
     register_presenter("shelf", Shelves)
 

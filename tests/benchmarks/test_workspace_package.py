@@ -5,27 +5,16 @@ from __future__ import annotations
 import importlib
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
 from PIL import Image
 
-from benchmarks.cli.app import main
 from legible_envs.rollouts import Trajectory, load_trajectories, read_csv, save_trajectories, write_csv
 from legible_envs.workspace import make_workspace
+from tests.support.command_line import legible, page_data
 
 SHELF = "tests.support.shelf_workspace:ShelfWorkspace"
-
-
-def legible(*arguments: str | Path | int, text: str | None = None) -> Result:
-    return CliRunner().invoke(main, [str(a) for a in arguments], input=text)
-
-
-def page_data(folder: Path) -> Any:
-    text = (folder / "report.html").read_text(encoding="utf-8")
-    return json.loads(text.split('<script type="application/json" id="data">')[1].split("</script>")[0])
 
 
 @pytest.fixture

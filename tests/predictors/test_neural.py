@@ -279,7 +279,7 @@ def test_reads_real_pointing_as_well_as_a_gru_did_before() -> None:
 def test_files_of_others_are_refused(on_reaches: NeuralPredictor, tmp_path: Path) -> None:
     path = on_reaches.save(tmp_path / "p.npz")
     other = TransformerPredictor if isinstance(on_reaches, RecurrentPredictor) else RecurrentPredictor
-    with pytest.raises(ValueError, match=f"not '{other._name}'"):
+    with pytest.raises(ValueError, match=f"not '{'transformer' if other is TransformerPredictor else 'recurrent'}'"):
         other.load(path)
     with pytest.raises(FileNotFoundError):
         RecurrentPredictor.load(tmp_path / "nothing.npz")

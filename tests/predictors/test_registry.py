@@ -97,8 +97,8 @@ def test_the_check_says_what_is_wrong() -> None:
         check_predictor(Crowd, example_trajectories()[:4])
 
 
+@pytest.mark.usefixtures("clean_registries")
 def test_predictors_are_found_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(registry._registry, "_registered", {})
     assert isinstance(make_predictor("bayesian", beta=2.0), BayesianGoalPredictor)
     assert make_predictor("shortest-distance", metric="geodesic").get_params() == {"metric": "geodesic"}
     assert isinstance(make_predictor("predictors:ShortestDistance"), ShortestDistance)
@@ -136,6 +136,7 @@ def test_predictors_are_found_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
         register_predictor("other", 3)  # type: ignore[arg-type]
 
 
+@pytest.mark.usefixtures("clean_registries")
 @pytest.mark.parametrize("metadata", ["none", "ours", "another package's"])
 def test_built_in_predictors_are_listed_once_whatever_is_installed(
     metadata: str, monkeypatch: pytest.MonkeyPatch
@@ -144,7 +145,6 @@ def test_built_in_predictors_are_listed_once_whatever_is_installed(
     points = [EntryPoint(name, target, ENTRY_POINT_GROUP) for name, target in BUILT_IN.items()]
     if metadata == "another package's":
         points = [EntryPoint("bayesian", "predictors.grid.shortest_distance:ShortestDistance", ENTRY_POINT_GROUP)]
-    monkeypatch.setattr(registry._registry, "_registered", {})
     monkeypatch.setattr(plugins, "entry_points", lambda group: [] if metadata == "none" else points)
     assert {name: (info.origin, info.target) for name, info in list_predictors().items()} == {
         name: ("built in", target) for name, target in BUILT_IN.items()

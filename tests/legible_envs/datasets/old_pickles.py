@@ -15,6 +15,8 @@ from legible_envs.overcooked.game.replay import GameArrays, predict_transitions
 
 DIRECTIONS = ([0, -1], [0, 1], [1, 0], [-1, 0], [0, 0], "INTERACT")
 ITEM_NAMES = {2: "onion", 5: "dish", 6: "soup"}
+ROOM = OvercookedLayout.from_ascii("XXPXX\nO  2O\nX1  X\nXDXSX")
+HALL = OvercookedLayout.from_ascii("XXPPX\nX   S\nD12 X\nXOOXX")
 
 
 def named(module: str, name: str) -> Any:

@@ -8,7 +8,10 @@ import math
 import numpy as np
 
 from legible_envs.overcooked import OvercookedLayout, OvercookedWorkspace
+from legible_envs.overcooked.humans import BoltzmannWalker
 from legible_envs.tasks import TaskGraph
+
+OPEN = OvercookedLayout.from_ascii("XOXXTX\nX    X\nX    X\nD    P\nXXSXXX")
 
 
 def all_shortest_walks(layout: OvercookedLayout, start: str, goal: str):
@@ -80,6 +83,11 @@ def brute_force_reach(layout, start, goal, goals, *, weigh, beta=1.0, c=1.0, str
                 value = -c * t * (1.0 if strict else (len(top) - 1) / len(top))
             total += weight * value / len(walks)
     return total
+
+
+def brisk(**arguments) -> BoltzmannWalker:
+    """A walker who neither idles nor looks around."""
+    return BoltzmannWalker(idle=0.0, turn=0.0, **arguments)
 
 
 def random_kitchen(rng: np.random.Generator, shape: tuple[int, int]) -> OvercookedLayout:

@@ -17,9 +17,8 @@ UP, DOWN, RIGHT, LEFT, SPACE, ESCAPE = 1073741906, 1073741905, 1073741903, 10737
 
 
 @pytest.fixture
-def keyboard(monkeypatch):  # type: ignore[no-untyped-def]
+def keyboard(monkeypatch, no_screen):  # type: ignore[no-untyped-def]
     """Replace the event queue by a script: each poll hands over the next entry; at its end the window is closed."""
-    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     from legible_envs.overcooked.rendering import load_pygame
 
     pygame = load_pygame()

@@ -124,7 +124,7 @@ def test_bad_rows(rows):
 def test_layouts_are_immutable():
     layout = OvercookedLayout.from_ascii(KITCHEN)
     with pytest.raises(AttributeError, match="immutable"):
-        layout._cells = None
+        layout.cells = None
     with pytest.raises(AttributeError, match="immutable"):
         layout.extra = 1
     with pytest.raises(ValueError, match="read-only"):

@@ -165,8 +165,8 @@ def test_a_recording_holds_the_walks_of_its_episodes() -> None:
         RecordTrajectories(gym.make("CartPole-v1"))
 
 
+@pytest.mark.usefixtures("no_screen")
 def test_gymnasiums_own_play_can_be_recorded(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     from gymnasium.utils.play import PlayableGame, play
 
     env = RecordTrajectories(

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from legible_envs import layout_kinds
 from legible_envs.errors import LayoutError
 from legible_envs.layout_kinds import LayoutKind, kind_named, kind_of, kind_of_line, register_layout_kind
 from legible_envs.overcooked import OvercookedLayout
@@ -24,7 +23,6 @@ from legible_envs.rollouts import (
     save_trajectories,
     write_csv,
 )
-from legible_envs.rollouts import reading as reading_module
 from legible_envs.tabletop import Table, TableObject, TabletopLayout, VirtualObstacle
 
 KITCHEN = OvercookedLayout.from_ascii("XOXTX\nX   X\nD   P\nXXSXX")
@@ -45,13 +43,9 @@ class Shelf:
         return f"shelf\n{self.boxes}"
 
 
+pytestmark = pytest.mark.usefixtures("clean_registries")
+
 SHELF = LayoutKind("shelf", Shelf, Shelf.to_text, Shelf.from_text)
-
-
-@pytest.fixture(autouse=True)
-def _clean_registries(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(layout_kinds._registry, "_registered", {})
-    monkeypatch.setattr(reading_module._registry, "_registered", {})
 
 
 def reach(layout: object, **more: object) -> Trajectory:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 
 import numpy as np
@@ -82,29 +81,6 @@ def play(env, seed=0, options=None):
     while not results or not (results[-1][2] or results[-1][3]):
         results.append(env.step(player(env)))
     return results
-
-
-def wander(env, seed, steps=150):
-    """Move about near the objects, so that something happens."""
-    rng = np.random.default_rng(seed)
-    results = [env.reset(seed=seed)]
-    results += ramble(env, rng, steps)
-    return results
-
-
-def ramble(env, rng, steps):
-    results = []
-    for step in range(steps):
-        if step % 10 == 0:
-            target, speed = rng.uniform((0.1, 0.2), (0.8, 0.7)), rng.choice([0.15, 0.6])
-        results.append(env.step(towards(env, target, speed)))
-    return results
-
-
-def digest(env):
-    """What happened, in short."""
-    results = wander(env, 7, 250)
-    return hashlib.sha256(repr([result[0].tolist() for result in results]).encode()).hexdigest()
 
 
 class Grabber:

@@ -1,23 +1,12 @@
-"""The table as an environment: rules of taking and placing, pushing, obstacles, observations, copies, replays."""
+"""The table as an environment: rules of taking and placing, pushing, obstacles, observations."""
 
 from __future__ import annotations
 
-import copy
-import itertools
-import json
 import math
-import os
-import pickle
-import subprocess
-import sys
-import warnings
-from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
 import pytest
-from gymnasium.envs.registration import EnvSpec
-from gymnasium.utils.env_checker import check_env, data_equivalence
 
 import legible_envs  # noqa: F401
 from legible_envs.errors import LayoutError, TaskError
@@ -27,96 +16,12 @@ from tests.legible_envs.tabletop.table_envs import APART, FIRST, NAME, SECOND, T
 from tests.legible_envs.tabletop.table_player import (
     Grabber,
     Player,
-    digest,
     fetch,
     go_to,
     play,
-    ramble,
-    wander,
 )
 
-VARIANTS = [
-    {"layout": WALL, "virtual_obstacles": "soft", "crossing_cost": 1.0},
-    {"layout": WALL, "contact": "always", "max_speed": 0.5},
-    {"task": "tea", "contact": "never", "predictor": "bayesian"},
-    {"task": "bins", "max_obstacles": 0},
-    {"layout": WALL, "partner": "robot", "contact": "always", "max_speed": 0.5},
-    {"partner": {"max_speed": 0.5}, "threshold": 0.0, "time_cost": 0.0},
-]
-each = pytest.mark.parametrize("arguments", VARIANTS, ids=[f"table-{i}" for i in range(len(VARIANTS))])
-
-
-# -- what Gymnasium asks -----------------------------------------------------------------------------------------
-
-
-@each
-def test_gymnasium_finds_nothing_wrong(arguments):
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        env = make(**arguments)
-        check_env(env.unwrapped, skip_render_check=True)
-        results = wander(env, 0)
-    assert all(env.observation_space.contains(result[0]) for result in results)
-
-
-@each
-def test_same_seed_and_actions_same_episode(arguments):
-    first, second = (wander(make(**arguments), 5) for _ in range(2))
-    assert data_equivalence(first, second, exact=True)
-
-
-@each
-@pytest.mark.parametrize("copier", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
-def test_copies_go_on_alone(arguments, copier):
-    env = make(**arguments)
-    wander(env, 2, 75)
-    twin = copier(env)
-    ahead = ramble(env, np.random.default_rng(1), 75)
-    assert data_equivalence(ahead, ramble(twin, np.random.default_rng(1), 75), exact=True)
-    assert data_equivalence(env.reset(), twin.reset(), exact=True)
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [*VARIANTS[:5], {"layout": WALL.to_json()}, {"layout": WALL.to_genome(), "task": TASK}, {"task": TASK.to_dict()}],
-)
-def test_spec_goes_through_json(arguments, tmp_path):
-    env = make(**arguments)
-    text = env.spec.to_json()
-    json.loads(text)
-    again = gym.make(EnvSpec.from_json(text))
-    assert data_equivalence(wander(env, 3, 40), wander(again, 3, 40), exact=True)
-    path = TASK.to_yaml(tmp_path / "task.yaml") and tmp_path / "task.yaml"
-    assert gym.make(EnvSpec.from_json(make(task=path).spec.to_json())).unwrapped.task == TASK
-
-
-SCRIPT = """
-import sys, gymnasium as gym, legible_envs
-sys.path.insert(0, {folder!r})
-from tests.legible_envs.tabletop.table_player import digest
-print(digest(gym.make({name!r}, **{arguments!r})))
-"""
-
-
-def test_replays_are_exact_in_a_new_process():
-    arguments = {**VARIANTS[4], "layout": WALL.to_json()}
-    script = SCRIPT.format(folder=str(Path(__file__).parents[3]), name=NAME, arguments=arguments)
-    environment = {**os.environ, "PYTHONHASHSEED": "7"}
-    result = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, env=environment, timeout=240, check=False
-    )
-    assert result.returncode == 0, result.stderr
-    assert result.stdout.strip() == digest(make(**arguments))
-
-
-def test_vectors_of_tables():
-    envs = gym.make_vec(NAME, num_envs=2, vectorization_mode="sync", predictor="bayesian")
-    envs.reset(seed=0)
-    envs.set_attr("layout", [WALL, TASK.layout])
-    _, info = envs.reset()
-    assert info["layout_id"].tolist() == [WALL.layout_id, TASK.layout.layout_id]
-    envs.step(envs.action_space.sample())
-    assert envs.get_attr("layout") == (WALL, TASK.layout)
+# -- vectors -----------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("busy", [0, 1])
@@ -128,36 +33,6 @@ def test_vectors_of_tables_where_one_has_a_belief_and_the_other_none(busy):
     assert info["holding"].tolist() == [FIRST[0] if i == busy else None for i in range(2)]
     for goal in FIRST:
         assert info["belief"]["_" + goal].tolist() == [i != busy for i in range(2)]
-
-
-@pytest.mark.parametrize("mode", ["sync", "async"])
-def test_vectors_stack_what_is_valid(mode):
-    envs = gym.make_vec(NAME, num_envs=2, vectorization_mode=mode, partner="robot")
-    _, info = envs.reset(seed=0)
-    try:
-        for _ in range(3):
-            assert info["goal_mask"].shape == (2, 8)
-            assert info["goal_mask"].dtype == np.bool_
-            for mask, names in zip(info["goal_mask"], info["goals"], strict=True):
-                assert {name for name, valid in zip(TASK.layout.goals, mask, strict=True) if valid} == set(names)
-            assert info["num_done"].tolist() == [0, 0]
-            assert envs.call("goals") == tuple(info["goals"])
-            _, _, _, _, info = envs.step(envs.action_space.sample() * 0)
-    finally:
-        envs.close()
-
-
-def test_info_has_the_same_keys_and_shares_no_array():
-    env = make(partner="robot")
-    seen = [env.reset(seed=0)[1]] + [result[4] for result in play(env)]
-    assert all(info.keys() == seen[0].keys() for info in seen)
-    assert "done" not in seen[0]
-    for info in seen:
-        assert info["goals"] == tuple(sorted(info["goals"]))
-        assert set(info["goals"]) == set(np.array(TASK.layout.goals)[info["goal_mask"]])
-    assert len({id(info["goal_mask"]) for info in seen}) == len(seen)
-    assert not any(np.shares_memory(a["goal_mask"], b["goal_mask"]) for a, b in itertools.pairwise(seen))
-    assert not seen[-1]["goal_mask"].any()
 
 
 def test_partners_are_not_shared_among_environments():

@@ -30,19 +30,6 @@ def test_layouts_in_every_form(tmp_path):
         assert make(layout=form).unwrapped.layout == WALL
 
 
-def test_layouts_are_sticky_until_replaced():
-    env = make()
-    default = env.unwrapped.layout
-    assert env.reset(options={"layout": WALL})[1]["layout_id"] == WALL.layout_id
-    assert env.reset()[1]["layout_id"] == WALL.layout_id
-    env.set_wrapper_attr("layout", default)
-    assert env.step(np.zeros(2))[4]["layout_id"] == WALL.layout_id
-    assert env.get_wrapper_attr("layout") == default
-    assert env.reset()[1]["layout_id"] == default.layout_id
-    env.reset(options={"layout": WALL})
-    assert env.reset(options={"layout": None})[1]["layout_id"] == default.layout_id
-
-
 def test_starts():
     env = make(layout=WALL)
     for start, at, name in (
@@ -175,17 +162,7 @@ def test_bad_arguments(arguments):
         TabletopEnv(**arguments)
 
 
-def test_unknown_options_and_tasks():
-    env = make()
-    with pytest.raises(ValueError, match=r"colour.*layout"):
-        env.reset(options={"colour": 3})
+def test_unknown_tasks():
     for task in ("chess", 5, {"name": "x"}):
         with pytest.raises(TaskError):
             make(task=task)
-
-
-def test_truncation():
-    env = make()
-    env.reset(seed=0)
-    for step in range(1, 1801):
-        assert env.step(np.zeros(2))[3] == (step == 1800)

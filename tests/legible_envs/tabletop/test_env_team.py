@@ -163,9 +163,9 @@ def test_partners_and_predictors_of_ones_own():
 
 
 @pytest.mark.filterwarnings("ignore:.*matplotlib")
-def test_playable_by_hand(monkeypatch):
+@pytest.mark.usefixtures("no_screen")
+def test_playable_by_hand():
     """``gymnasium.utils.play`` accepts the environment and its keys; with them a cube is fetched."""
-    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     import pygame
     from gymnasium.utils.play import PlayableGame
 

@@ -298,12 +298,13 @@ def test_long_histories_are_forgotten_at_rest(monkeypatch):
     worlds = physics_of(crowd()), physics_of(crowd())
     for physics in worlds:
         stir(physics, 60, 0)
+        busy = len(pickle.dumps(physics))
         for _ in range(60):
             physics.advance((1.1, 0.7), (0.0, 0.0), False)
         assert physics.is_resting
         before = physics.positions.copy()
         physics.settle()
-        assert len(physics._log) == 0
+        assert len(pickle.dumps(physics)) < busy / 2, "a picklable history is all that makes a world larger"
         assert np.array_equal(before, physics.positions)
     twin = pickle.loads(pickle.dumps(worlds[0]))
     futures = [stir(physics, 60, 1) for physics in (*worlds, twin)]

@@ -290,8 +290,18 @@ def test_what_is_carried_moves_with_hand_or_gripper() -> None:
 
 
 def test_a_hand_beyond_the_edge_and_a_belief_in_nothing_are_drawn() -> None:
-    for hand in ([-0.3, 0.4], [1.4, 1.0], [0.0, 0.0]):
-        draw_scene(at(hand=np.array(hand), belief={"red-circle": float("nan"), "nobody": 0.5}), width=200)
+    def drawn(x: float, y: float, **belief: float) -> np.ndarray:
+        return draw_scene(at(hand=np.array([x, y]), belief=belief or None), width=200, hud=False)
+
+    away, further, corner = drawn(-0.3, 0.4), drawn(1.4, 1.0), drawn(0.0, 0.0)
+    assert np.array_equal(away, further), "a hand off the picture is not seen"
+    assert (away != corner).any(), "half of a hand on the edge is"
+    changed = np.argwhere((away != corner).any(axis=-1))
+    column, row = Frame.of(TABLES.table, 200).pixel(0, 0)
+    assert np.abs(changed - (row, column)).max() < 0.1 * 200, "and nothing else changes"
+    for unknown in ({"red-circle": float("nan")}, {"no such object": 0.5}):
+        assert np.array_equal(drawn(0.0, 0.0, **unknown), corner), "no bar without an object and a number"
+    assert not np.array_equal(drawn(0.0, 0.0, **{"red-circle": 0.5}), corner)
 
 
 @pytest.mark.parametrize(
@@ -323,12 +333,18 @@ def test_panels_show_every_layout_and_the_configuration() -> None:
 
 
 def test_captions_are_the_scores_of_the_layouts() -> None:
-    from legible_envs.tabletop.rendering.panels import _caption
     from legible_envs.tabletop.scoring.scorer import TabletopScorer
 
     scores = TabletopScorer(TASK).score_layouts([WALLED])
-    assert f"legibility {scores.legibility[0]:.2f}" in _caption(WALLED, TASK, None).replace("\u2212", "-")
-    assert f"mean detour {scores.mean_detour[0]:.2f}" in _caption(WALLED, TASK, None)
+    legibility = f"legibility {scores.legibility[0]:.2f}".replace("-", "\u2212")
+    detour = f"mean detour {scores.mean_detour[0]:.2f} ×, {scores.distance[0]:.2f} m in all"
+
+    def drawn(*lines: str) -> np.ndarray:
+        captions = {"Walled": "\n".join(lines)} if lines else None
+        return draw_panels({"Walled": WALLED}, TASK, width=200, ambiguity=False, captions=captions)
+
+    assert np.array_equal(drawn(), drawn(legibility, detour))
+    assert not np.array_equal(drawn(), drawn(legibility, detour.replace("in all", "at most")))
 
 
 def test_the_configuration_shows_every_object_in_its_place() -> None:

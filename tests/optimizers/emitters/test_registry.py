@@ -17,16 +17,12 @@ from optimizers import (
     search,
 )
 from optimizers.archives import archive_arrays
-from optimizers.emitters import registry
 from tests.support.shelf_workspace import ShelfWorkspace
+
+pytestmark = pytest.mark.usefixtures("clean_registries")
 
 SHELF = ShelfWorkspace()
 KITCHEN = OvercookedWorkspace(shape=(5, 5))
-
-
-@pytest.fixture(autouse=True)
-def _clean_registry(monkeypatch):
-    monkeypatch.setattr(registry._registry, "_registered", {})
 
 
 class Shift(WorkspaceEmitter):
