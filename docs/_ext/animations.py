@@ -38,7 +38,7 @@ INK, PALE, RIGHT, WRONG = "#1f2328", "#d8dee4", "#1a7f37", "#9a6700"
 FETCHES = ("tomato", "onion", "cabbage")
 CANDIDATES = ("tomato", "onion", "cabbage", "fish", "dish")
 STEP, REST = 380, 1500  # milliseconds
-COLOURS, FREQUENT = 192, 96
+COLOURS, FREQUENT = 255, 160
 
 Frame = np.ndarray
 Cell = tuple[int, int]
@@ -220,7 +220,7 @@ def _in_palette(picture: Image.Image, palette: np.ndarray) -> Image.Image:
 
 def write_episode(env_id: str, path: Path) -> Path:
     """Write the moving picture of an environment."""
-    return write_gif(path, episode_frames(env_id), width=560)
+    return write_gif(path, episode_frames(env_id))
 
 
 def main() -> None:
