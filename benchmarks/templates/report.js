@@ -52,8 +52,7 @@
   const cellWidth = Math.max(7, Math.min(26, 640 / columnAxis.count));
   const cellHeight = Math.max(6, Math.min(34, 560 / rowAxis.count));
   const longest = Math.max(...columnAxis.labels.map((label) => label.length));
-  const wanted = 1.5 * columnAxis.count * cellWidth > 400 ? 1.5 : 1;
-  const scale = narrow ? wanted : 1;
+  const scale = narrow && columnAxis.count * cellWidth > 270 ? 1.5 : 1; // a small archive is not drawn smaller
   const margin = { left: scale * Math.max(44, 26 + 6.4 * Math.max(...rowAxis.labels.map((label) => label.length))), top: 4, bottom: scale * (14 + longest * 6.6 + 22) };
   const size = { width: margin.left + columnAxis.count * cellWidth + 2, height: margin.top + rowAxis.count * cellHeight + margin.bottom };
   const cellX = (column) => margin.left + column * cellWidth;
