@@ -1,4 +1,5 @@
-# make demo   install into .venv and run the main job (no torch needed)
+## Start
+# make demo   install into .venv and run the main job (no torch)
 # make test   install everything the tests need and run them
 # make help   list all targets
 
@@ -17,7 +18,8 @@ EXAMPLES := docs/examples/legible-emitter-example docs/examples/legible-workspac
 .DEFAULT_GOAL := help
 
 help:
-	@sed -n 's/^# make/make/p' $(MAKEFILE_LIST)
+	@awk '/^## / { print (n++ ? "\n" : "") substr($$0, 4) ":" } \
+	  /^# make / { name = $$3; sub(/^# make [^ ]+ +/, ""); printf "  make %-17s%s\n", name, $$0 }' $(MAKEFILE_LIST)
 
 $(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
@@ -43,6 +45,7 @@ test: $(VENV)/.test-installed
 	$(BIN)/legible humans fetch || [ "$${LEGIBLE_REQUIRE_DATA:-0}" = 0 ]
 	$(BIN)/python -m pytest $(PYTEST_ARGS)
 
+## Check
 # make test-benchmarks   the tests that take minutes each
 test-benchmarks: $(VENV)/.test-installed
 	$(BIN)/python -m pytest -m benchmark
@@ -55,20 +58,23 @@ lint: $(VENV)/.test-installed
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
 
+## Write
 # make format   put the code into the project's style
 format: $(VENV)/.test-installed
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-# make docs   build the site into docs/_build/html, warnings are errors
+# make docs   build the site, docs/_build/html; warnings are errors
 docs: $(VENV)/.test-installed
 	rm -rf docs/_build docs/environments/Legible*
 	$(BIN)/python -m sphinx -q -W --keep-going -b html docs docs/_build/html
 
+## Speed
 # make bench   speed, as ratios within one run, with peers beside it
 bench: $(VENV)/.run-installed
 	$(BIN)/legible bench --peers --out docs/benchmarks.md
 
+## Maintain
 # make lock   pin the newest versions that fit pyproject.toml
 lock: | $(BIN)/python
 	$(PIP) uv

@@ -25,6 +25,8 @@
     const spaced = whole.replace(/\B(?=(\d{3})+$)/g, "\u202f");
     return (value < 0 && Number(value.toFixed(digits)) !== 0 ? "\u2212" : "") + spaced + (rest ? "." + rest : "");
   }
+  // On a phone charts are drawn smaller than they are laid out; their text is laid out larger.
+  const narrow = matchMedia("(max-width: 820px)").matches;
   const plural = (n, word) => `${number(n, 0)} ${word}${n === 1 ? "" : "s"}`;
   function tell(text) {
     $("tip").textContent = text;
@@ -50,7 +52,8 @@
   const cellWidth = Math.max(7, Math.min(26, 640 / columnAxis.count));
   const cellHeight = Math.max(6, Math.min(34, 560 / rowAxis.count));
   const longest = Math.max(...columnAxis.labels.map((label) => label.length));
-  const margin = { left: Math.max(44, 26 + 6.4 * Math.max(...rowAxis.labels.map((label) => label.length))), top: 4, bottom: 14 + longest * 6.6 + 22 };
+  const scale = narrow && columnAxis.count * cellWidth > 270 ? 1.5 : 1; // a small archive is not drawn smaller
+  const margin = { left: scale * Math.max(44, 26 + 6.4 * Math.max(...rowAxis.labels.map((label) => label.length))), top: 4, bottom: scale * (14 + longest * 6.6 + 22) };
   const size = { width: margin.left + columnAxis.count * cellWidth + 2, height: margin.top + rowAxis.count * cellHeight + margin.bottom };
   const cellX = (column) => margin.left + column * cellWidth;
   const cellY = (row) => margin.top + (rowAxis.count - 1 - row) * cellHeight;
@@ -61,6 +64,7 @@
   function drawMap() {
     picture = svg("svg", { viewBox: `0 0 ${size.width} ${size.height}`, "aria-hidden": "true" });
     picture.style.maxWidth = `${1.6 * size.width}px`; // labels of small archives stay labels
+    picture.style.setProperty("--scale", scale);
     const inset = Math.min(1, cellWidth / 12);
     const paint = (cell, attributes) => svg("rect", { x: cell.x + inset, y: cell.y + inset, width: cellWidth - 2 * inset, height: cellHeight - 2 * inset, rx: 2, ...attributes });
     for (let row = 0; row < rowAxis.count; row++) {
@@ -70,10 +74,10 @@
         picture.append(cell ? paint(place, { fill: shade(cell.objective), class: "cell", "data-rank": cell.rank }) : paint(place, { class: "empty" }));
       }
     }
-    const every = Math.max(1, Math.ceil(13 / cellWidth));
+    const every = Math.max(1, Math.ceil(13 * scale / cellWidth));
     columnAxis.labels.forEach((label, i) => {
-      const x = cellX(i) + cellWidth / 2, y = size.height - margin.bottom + 10;
-      const text = svg("text", { class: "mono", transform: `translate(${x + 3.5} ${y}) rotate(-90)`, "text-anchor": "end" });
+      const x = cellX(i) + cellWidth / 2, y = size.height - margin.bottom + 10 * scale;
+      const text = svg("text", { class: "mono", transform: `translate(${x + 3.5 * scale} ${y}) rotate(-90)`, "text-anchor": "end" });
       if (i % every === 0) text.textContent = label;
       columnNames.push(text);
       const title = svg("title");
@@ -81,16 +85,16 @@
       text.append(title);
       picture.append(text);
     });
-    const everyRow = Math.max(1, Math.ceil(14 / cellHeight), rowAxis.count > 30 ? 5 : 1);
+    const everyRow = Math.max(1, Math.ceil(14 * scale / cellHeight), rowAxis.count > 30 ? 5 : 1);
     rowAxis.labels.forEach((label, i) => {
-      const text = svg("text", { x: margin.left - 8, y: cellY(i) + cellHeight / 2 + 4, "text-anchor": "end" });
+      const text = svg("text", { x: margin.left - 8, y: cellY(i) + cellHeight / 2 + 4 * scale, "text-anchor": "end" });
       if (i % everyRow === 0) text.textContent = label;
       rowNames.push(text);
       picture.append(text);
     });
-    const under = svg("text", { x: margin.left + columnAxis.count * cellWidth / 2, y: size.height - 4, "text-anchor": "middle" });
+    const under = svg("text", { x: margin.left + columnAxis.count * cellWidth / 2, y: size.height - 4 * scale, "text-anchor": "middle" });
     under.textContent = axisName(columnAxis.name) + " →";
-    const beside = svg("text", { transform: `translate(10 ${margin.top + rowAxis.count * cellHeight / 2}) rotate(-90)`, "text-anchor": "middle" });
+    const beside = svg("text", { transform: `translate(${10 * scale} ${margin.top + rowAxis.count * cellHeight / 2}) rotate(-90)`, "text-anchor": "middle" });
     beside.textContent = axisName(rowAxis.name) + " →";
     picture.append(under, beside);
     if (cells.length) {
@@ -108,8 +112,9 @@
     const bar = el("span", { class: "ramp" });
     bar.style.background = `linear-gradient(90deg, ${stops})`;
     const names = { "legibility": hasCosts ? "legibility net of costs" : "legibility", "efficiency": "efficiency (distance, negated)" };
-    const parts = [el("span", {}, names[data.objective.name] || data.objective.name), el("span", {}, (low < floorValue ? "≤ " : "") + number(floorValue)), bar, el("span", {}, number(high)), el("span", { class: "swatch ring" }), "best"];
-    if (cells.length < rowAxis.count * columnAxis.count) parts.push(el("span", { class: "swatch" }), "none found");
+    const key = (kind, text) => el("span", { class: "key" }, el("span", { class: kind }), text);
+    const parts = [el("span", {}, names[data.objective.name] || data.objective.name), el("span", {}, (low < floorValue ? "≤ " : "") + number(floorValue)), bar, el("span", {}, number(high)), key("swatch ring", "best")];
+    if (cells.length < rowAxis.count * columnAxis.count) parts.push(key("swatch", "none found"));
     if (rowAxis.step * columnAxis.step > 1) parts.push(el("span", {}, `each square: the best of ${rowAxis.step * columnAxis.step} cells`));
     const rows = rowAxis.labels.length * rowAxis.step;
     if (rows < rowAxis.whole) parts.push(el("span", {}, `rows ${rows} to ${rowAxis.whole - 1} are empty and left out`));
@@ -265,6 +270,7 @@
   }
   function drawCurves() {
     const xs = data.history.evaluations;
+    const domain = xs.length > 1 ? xs : [0, xs[0]];
     const charts = [["best", "Best " + data.objective.name + (hasCosts ? ", net of costs" : ""), number], ["qd_score", "QD score", (v) => number(v, 0)], ["coverage", "Coverage", (v) => number(v * 100, 1) + " %"]];
     const moves = [];
     for (const [key, title, format] of charts) {
@@ -275,9 +281,10 @@
       if (key === "coverage" || (bottom > 0 && bottom < top * 0.6)) bottom = 0;
       if (top === bottom) top = bottom + 1;
       const frame = { width: 380, height: 220, left: 48, under: 30 };
-      const { canvas, x, y } = axes(frame, xs, [bottom, top], { format: key === "coverage" ? (v) => number(v * 100, 0) + " %" : compact, label: `${title} against evaluations: ends at ${format(ys[ys.length - 1])}` });
+      const { canvas, x, y } = axes(frame, domain, [bottom, top], { format: key === "coverage" ? (v) => number(v * 100, 0) + " %" : compact, label: `${title} against evaluations: ends at ${format(ys[ys.length - 1])}` });
       const path = points.map(([px, py], i) => `${i ? "L" : "M"}${x(px).toFixed(1)} ${y(py).toFixed(1)}`).join("");
       canvas.append(svg("path", { class: "area", d: `${path}L${x(points[points.length - 1][0])} ${frame.height - frame.under}L${x(points[0][0])} ${frame.height - frame.under}Z` }), svg("path", { class: "line", d: path }));
+      if (points.length === 1) canvas.append(svg("circle", { class: "dot", r: 4.5, cx: x(points[0][0]), cy: y(points[0][1]) }));
       const hair = svg("line", { class: "hair", y1: 8, y2: frame.height - frame.under, visibility: "hidden" }), dot = svg("circle", { class: "dot", r: 4.5, visibility: "hidden" });
       canvas.append(hair, dot);
       const output = el("output", {}, format(ys[ys.length - 1]));
@@ -294,7 +301,7 @@
       });
       canvas.addEventListener("pointermove", (event) => {
         const box = canvas.getBoundingClientRect();
-        const at = xs[0] + ((event.clientX - box.left) / box.width * frame.width - frame.left) / (frame.width - frame.left - 8) * (xs[xs.length - 1] - xs[0]);
+        const at = domain[0] + ((event.clientX - box.left) / box.width * frame.width - frame.left) / (frame.width - frame.left - 8) * (domain[domain.length - 1] - domain[0]);
         let nearest = 0;
         xs.forEach((v, i) => { if (Math.abs(v - at) < Math.abs(xs[nearest] - at)) nearest = i; });
         moves.forEach((move) => move(nearest));
@@ -304,7 +311,7 @@
   }
   function drawPeople() {
     const { fractions, curves } = data.recorded_play;
-    const frame = { width: 520, height: 300, left: 48, under: 46 };
+    const frame = narrow ? { width: 380, height: 250, left: 48, under: 46 } : { width: 520, height: 300, left: 48, under: 46 };
     const all = curves.flatMap((curve) => curve.values).filter((v) => v !== null);
     const percent = (v) => number(v * 100, 0) + " %";
     const { canvas, x, y } = axes(frame, fractions, [Math.floor(Math.min(...all, 1) * 10) / 10, Math.ceil(Math.max(...all, 0) * 10) / 10], { format: percent, formatX: percent, label: curves.map((curve) => `${curve.label}: ${curve.values.map((v) => number(v, 2)).join(", ")}`).join(". ") });

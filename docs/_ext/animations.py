@@ -1,9 +1,12 @@
 """The moving pictures of README and site, made by the program itself.
 
-    python docs/_ext/animations.py    # writes docs/images/prediction.gif, about half a minute
+    python docs/_ext/animations.py    # writes these three, about ten seconds
 
-The first shows one person fetching the same things in two kitchens, and what an observer believes while they walk; the
-others show each environment with a simulated person at work.
+- ``docs/images/prediction.gif``: one person fetches the same ingredients in two kitchens, and an observer's belief;
+- ``docs/images/kitchen.gif``: ``LegibleOvercooked-v0`` with the scripted cook;
+- ``docs/images/table.gif``: ``LegibleTabletop-v0`` with a simulated participant.
+
+All are seeded: a second run writes the same bytes. The pages of the environments show the last two as well.
 """
 
 from __future__ import annotations
@@ -11,10 +14,12 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import gymnasium as gym
 import numpy as np
 from PIL import Image
+from scipy.spatial import KDTree
 
 import legible_envs  # noqa: F401 - registers the environments
 from legible_envs.drawing.canvas import Canvas, paste, text_sprite
@@ -25,7 +30,6 @@ from legible_envs.overcooked.rendering import draw_game
 from legible_envs.rollouts import Trajectory
 from legible_envs.tabletop.humans import sample_person
 from legible_envs.tabletop.policies import ReachingPlayer
-from optimizers import search
 from predictors import BayesianGoalPredictor
 
 IMAGES = Path(__file__).parents[1] / "images"
@@ -34,13 +38,31 @@ INK, PALE, RIGHT, WRONG = "#1f2328", "#d8dee4", "#1a7f37", "#9a6700"
 FETCHES = ("tomato", "onion", "cabbage")
 CANDIDATES = ("tomato", "onion", "cabbage", "fish", "dish")
 STEP, REST = 380, 1500  # milliseconds
+COLOURS, FREQUENT = 255, 160
 
 Frame = np.ndarray
 Cell = tuple[int, int]
 
 
+class Episode(NamedTuple):
+    """What an environment's moving picture shows: until which step, every how many of them, and for how long each."""
+
+    picture: str
+    steps: int
+    every: int
+    milliseconds: int
+
+
+EPISODES = {
+    "LegibleOvercooked-v0": Episode("kitchen.gif", steps=60, every=1, milliseconds=150),  # until the first soup is out
+    "LegibleTabletop-v0": Episode("table.gif", steps=500, every=6, milliseconds=110),  # the whole task, a little faster
+}
+
+
 def two_kitchens(seed: int = 1) -> tuple[OvercookedLayout, OvercookedLayout]:
     """The median of 1,000 random kitchens by legibility, and the best of a search."""
+    from optimizers import search  # here, so that the pages of the environments do without pyribs
+
     workspace = OvercookedWorkspace(shape=(7, 7))
     genomes = workspace.sample(1000, np.random.default_rng(seed))
     median = genomes[np.argsort(workspace.legibility(genomes))[500]]
@@ -139,19 +161,20 @@ def _side_by_side(frames: Sequence[Frame], goal: str) -> Frame:
     return sheet
 
 
-def episode_frames(env_id: str, steps: int, every: int) -> Iterator[tuple[Frame, int]]:
-    """An environment with a simulated person at work."""
+def episode_frames(env_id: str) -> Iterator[tuple[Frame, int]]:
+    """An environment with a simulated person at work; the last frame rests."""
     rng = np.random.default_rng(0)
     env = gym.make(env_id, render_mode="rgb_array")
     obs, info = env.reset(seed=4)
-    is_kitchen = "Overcooked" in env_id
-    player = ScriptedPlayer(env, rng) if is_kitchen else ReachingPlayer(env, sample_person(rng), rng)
-    for step in range(steps):
-        if step % every == 0:
-            yield np.asarray(env.render()), 130 if is_kitchen else 100
+    player = ScriptedPlayer(env, rng) if "Overcooked" in env_id else ReachingPlayer(env, sample_person(rng), rng)
+    episode = EPISODES[env_id]
+    for step in range(episode.steps):
+        if step % episode.every == 0:
+            yield np.asarray(env.render()), episode.milliseconds
         obs, _, terminated, truncated, info = env.step(player(obs, info))
         if terminated or truncated:
             break
+    yield np.asarray(env.render()), REST
     env.close()
 
 
@@ -164,16 +187,48 @@ def write_gif(path: Path, frames: Iterator[tuple[Frame, int]], width: int | None
             picture = picture.resize((width, round(picture.height * width / picture.width)), Image.Resampling.LANCZOS)
         pictures.append(picture)
         durations.append(duration)
-    palette = pictures[len(pictures) // 2].quantize(96)
-    pictures = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
+    palette = _common_palette(pictures)
+    pictures = [_in_palette(picture, palette) for picture in pictures]
     pictures[0].save(path, save_all=True, append_images=pictures[1:], duration=durations, loop=0, optimize=True)
     return path
 
 
+def _common_palette(pictures: Sequence[Image.Image]) -> np.ndarray:
+    """Colours for all frames, found on some of them: the most frequent ones as they are, and a choice of the rest."""
+    some = pictures[:: max(1, len(pictures) // 8)]
+    sheet = np.concatenate([np.asarray(picture) for picture in some])
+    colours, index = _colours(sheet)
+    frequent = colours[np.argsort(-np.bincount(index), kind="stable")[:FREQUENT]]
+    chosen = Image.fromarray(sheet).quantize(COLOURS - len(frequent)).getpalette()
+    return np.concatenate([frequent, np.array(chosen, dtype=np.uint8).reshape(-1, 3)])
+
+
+def _colours(picture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The different colours of a picture, and for every pixel the index of its own."""
+    packed, index = np.unique(picture.reshape(-1, 3) @ np.array([1 << 16, 1 << 8, 1]), return_inverse=True)
+    return np.stack([packed >> 16, packed >> 8 & 255, packed & 255], axis=1).astype(np.uint8), index
+
+
+def _in_palette(picture: Image.Image, palette: np.ndarray) -> Image.Image:
+    """The picture in the nearest colours of the palette; Pillow itself rounds the colours before it compares."""
+    colours, index = _colours(np.asarray(picture))
+    nearest = KDTree(palette.astype(float)).query(colours.astype(float))[1].astype(np.uint8)
+    indexed = Image.fromarray(nearest[index].reshape(picture.height, picture.width))
+    indexed.putpalette(palette.ravel().tolist())
+    return indexed
+
+
+def write_episode(env_id: str, path: Path) -> Path:
+    """Write the moving picture of an environment."""
+    return write_gif(path, episode_frames(env_id))
+
+
 def main() -> None:
-    """Write the picture of the README."""
+    """Write the moving pictures of README and gallery."""
     IMAGES.mkdir(exist_ok=True)
-    sys.stdout.write(f"{write_gif(IMAGES / 'prediction.gif', prediction_frames())}\n")
+    paths = [write_episode(env_id, IMAGES / episode.picture) for env_id, episode in EPISODES.items()]
+    paths.append(write_gif(IMAGES / "prediction.gif", prediction_frames()))
+    sys.stdout.writelines(f"{path}\n" for path in paths)
 
 
 if __name__ == "__main__":

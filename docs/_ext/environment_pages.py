@@ -8,7 +8,7 @@ import re
 from pathlib import Path
 
 import gymnasium as gym
-import pygame
+from animations import write_episode
 from sphinx.application import Sphinx
 
 import legible_envs  # noqa: F401 - registers the environments
@@ -37,7 +37,8 @@ def page(env_id: str, picture: str) -> str:
     ]
     env.close()
     table = "| | |\n| --- | --- |\n" + "\n".join(f"| {key} | {value} |" for key, value in facts)
-    return f"# {env_id}\n\n{summary}\n\n![A frame of {env_id}]({picture})\n\n{table}\n\n{as_markdown(body)}\n"
+    image = f"![{env_id} with a simulated person at work]({picture})"
+    return f"# {env_id}\n\n{summary}\n\n{image}\n\n{table}\n\n{as_markdown(body)}\n"
 
 
 def describe(space: gym.Space) -> str:
@@ -69,26 +70,14 @@ def _split_indented(section: str) -> tuple[str, str]:
     return "\n".join(lines[:end]), "\n".join(lines[end:])
 
 
-def frame(env_id: str, path: Path) -> None:
-    """A frame some steps into an episode."""
-    env = gym.make(env_id, render_mode="rgb_array")
-    env.reset(seed=1)
-    env.action_space.seed(1)
-    for _ in range(20):
-        env.step(env.action_space.sample())
-    image = env.render()
-    env.close()
-    pygame.image.save(pygame.surfarray.make_surface(image.swapaxes(0, 1)), str(path))
-
-
 def write_pages(app: Sphinx) -> None:
     """Write every page that has changed, and its picture."""
     folder = Path(app.srcdir) / "environments"
     folder.mkdir(exist_ok=True)
     for env_id in IDS:
-        picture = f"{env_id}.png"
+        picture = f"{env_id}.gif"
         if not (folder / picture).exists():
-            frame(env_id, folder / picture)
+            write_episode(env_id, folder / picture)
         target, text = folder / f"{env_id}.md", page(env_id, picture)
         if not target.exists() or target.read_text(encoding="utf-8") != text:
             target.write_text(text, encoding="utf-8")
