@@ -42,7 +42,7 @@ PUBLISHED: Final[Mapping[str, Mapping[str, float]]] = {
     "Virtual Obstacle": {"f1": 0.796, "precision": 0.803, "recall": 0.800},
     "Both": {"f1": 0.936, "precision": 0.941, "recall": 0.937},
 }
-"""Tung et al. (HRI 2024), 12 people at the table: weighted means over goals."""
+"""Tung et al. (HRI 2024), 12 participants at the table: weighted means over goals."""
 PUBLISHED_SPREAD: Final[Mapping[str, Mapping[str, float]]] = {
     "Baseline": {"determinant": 9.36e-6, "trace": 7.12e-3},
     "Placement": {"determinant": 8.50e-6, "trace": 5.90e-3},

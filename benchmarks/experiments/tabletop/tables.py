@@ -157,7 +157,7 @@ def compliance_table(results: Results) -> pd.DataFrame:
 
 
 def hypotheses_of(results: Results) -> dict[str, Hypotheses]:
-    """H1 to H3 for each way to design tables, against the sorted one; for Both also against either alone."""
+    """H1 to H3 for each design of tables, against the sorted one; for Both also against either alone."""
     rows, curves = accuracy_rows(results), results.curves
     return {
         treatment: assess_hypotheses(
