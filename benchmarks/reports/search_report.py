@@ -329,7 +329,7 @@ def _figures(data: dict[str, Any], presenter: Presenter) -> list[tuple[str, str,
 
 
 def _settings(config: Mapping[str, Any]) -> list[tuple[str, list[tuple[str, str]]]]:
-    """The manifest as titled lists of name and value, for people."""
+    """The manifest as titled lists of name and value, for users."""
 
     def flat(value: Any, prefix: str = "") -> list[tuple[str, str]]:
         if isinstance(value, Mapping):

@@ -48,7 +48,7 @@ class Event:
         found: Those found on disk.
         failed: Trials given up.
         retried: Attempts that failed and were repeated.
-        running: What each worker is at: its name and the trial.
+        running: What each worker runs: its name and the trial.
         last: The newest outcome, if any.
     """
 
@@ -76,7 +76,7 @@ class TrialsFailed(RuntimeError):
 
 
 class Pool(Protocol):
-    """What runs trials: it takes them one by one and yields outcomes as they come."""
+    """Runs trials: takes them one by one and yields outcomes as they come."""
 
     def run(self, function: str, trials: Iterator[tuple[int, Trial]]) -> Iterator[Outcome | dict[str, Trial]]:
         """Outcomes in any order; between them, mappings of worker to trial whenever that changes."""

@@ -2,7 +2,7 @@
 
     python docs/_ext/animations.py    # writes docs/images/prediction.gif, about half a minute
 
-The first shows one person fetching the same objects in two kitchens, and what an observer believes while they walk; the
+The first shows one person fetching the same objects in two kitchens, and what an observer predicts while they walk; the
 others show each environment with a simulated person at work.
 """
 

@@ -35,7 +35,7 @@ def about_optimum(gap: pd.DataFrame) -> str:
 
 
 def about_local_search() -> str:
-    """What a plain local search is."""
+    """How a plain local search works."""
     return narrate("optimizers/local_search")
 
 

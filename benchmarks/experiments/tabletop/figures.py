@@ -107,7 +107,7 @@ def team_figure(teams: pd.DataFrame, *, size: ChartSize = "report") -> Chart:
         chart = Chart(
             "Participants and robots at work",
             "means over participants and 95 % confidence intervals",
-            "Alone: the same participants without a robot; they are never idle for want of an object to take.",
+            "Alone: the same participants without a robot; they always have an object to take, and are never idle.",
             description=f"Measures of teams by condition, {', '.join(predictors)}.",
             size=size,
             height=5.9,

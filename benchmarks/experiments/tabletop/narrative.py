@@ -174,7 +174,7 @@ def about_compliance(table: pd.DataFrame) -> str:
 
 
 def about_teams(results: Results, teams: pd.DataFrame, differences: pd.DataFrame) -> str:
-    """What a robot that predicts goals makes of the tables."""
+    """How a robot that predicts goals works at the tables."""
     robots = list(dict.fromkeys(teams["reader"]))
     first, mean = robots[0], teams.set_index(["reader", "measure", "condition"])["mean"]
 

@@ -91,7 +91,7 @@ def load_results(folder: Path) -> Results:
     """
     names = ("layouts", "readings", "curves", "spreads", "teams")
     layouts, readings, curves, spreads, teams = (logged_rows(folder, name, "tabletop") for name in names)
-    # What a robot without prediction was called in results of before.
+    # Earlier results call a robot without prediction so.
     teams = teams.replace({"reader": {"reads nothing": NO_PREDICTION}})
     return Results(layouts, by_table(readings), curves, spreads, teams)
 
