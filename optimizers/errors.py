@@ -1,4 +1,4 @@
-"""What can go wrong in a search; every error that ends one carries what was found until then."""
+"""Errors of a search; every error that ends one carries what was found until then."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What ``legible score`` and ``legible show`` say about one layout."""
+"""Output of ``legible score`` and ``legible show`` about one layout."""
 
 from __future__ import annotations
 

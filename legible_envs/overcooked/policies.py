@@ -229,7 +229,7 @@ class _Path:
         return int(look_around(cell, self.field.height, self.field.width, self._open, u))
 
     def next_direction(self, cell: int, walker: Walker, rng: np.random.Generator) -> int:
-        """Decide once at each cell: a person who turns to the goal does not think again before using it."""
+        """Decide once at each cell: a person who turns to the goal uses it without another decision."""
         if self._decided is None or self._decided[0] != cell:
             if self._decided is not None:
                 self._heading = self._decided[1]

@@ -1,4 +1,4 @@
-"""What the tables say: the figures behind the sentences of ``templates/experiments/optimizers``."""
+"""The figures behind the sentences of ``templates/experiments/optimizers``."""
 
 from __future__ import annotations
 

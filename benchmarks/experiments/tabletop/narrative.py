@@ -1,4 +1,4 @@
-"""What the tables say: the figures behind the sentences of ``templates/experiments/tabletop``."""
+"""The figures behind the sentences of ``templates/experiments/tabletop``."""
 
 from __future__ import annotations
 

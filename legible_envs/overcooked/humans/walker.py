@@ -33,7 +33,7 @@ class Walker(ABC):
     Args:
         preferences: ``(H, W)`` cost of stepping on each cell (> 0), for kitchens of that shape; None means 1 each.
         idle: Probability of each tick to be spent standing; about half in recorded play.
-        turn: Probability of each tick to be spent turning to something that cannot be walked on.
+        turn: Probability of each tick to be spent turning to a cell that is no floor.
         tick: Seconds per tick.
 
     Raises:
@@ -208,7 +208,7 @@ def _shortest_field(layout: OvercookedLayout, name: str) -> GoalField:
 
 
 def in_reach(layout: OvercookedLayout, cell: Cell, kind: str) -> list[str]:
-    """Stations of one type that can be walked to, the nearest first."""
+    """Stations of one type that a person can reach, the nearest first."""
     at = cell[0] * layout.shape[1] + cell[1]
     steps = {name: float(_shortest_field(layout, name).cost_to_go[at]) for name in layout.named(kind)}
     found = sorted((name for name in steps if steps[name] < np.inf), key=lambda name: steps[name])
