@@ -1,4 +1,4 @@
-"""What the command line prints: kitchens and tables in colour, and rows of numbers."""
+"""Output of the command line: kitchens and tables in colour, and rows of numbers."""
 
 from __future__ import annotations
 

@@ -117,7 +117,7 @@ class StateSpace:
 
     @cached_property
     def completions(self) -> dict[State, int]:
-        """Number of ways to finish the task from each state (copies distinct, goals of one subtask not)."""
+        """Number of sequences that finish the task from each state (copies distinct, goals of one subtask not)."""
         completions: dict[State, int] = {}
         for layer in reversed(self.layers):
             for state in layer:

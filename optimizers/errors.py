@@ -1,4 +1,4 @@
-"""What can go wrong in a search; every error that ends one carries what was found until then."""
+"""Errors of a search; every error that ends one carries what was found until then."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class EmitterError(ValueError):
     """An emitter is unknown, or breaks the contract of :mod:`optimizers.emitters.registry`.
 
     Attributes:
-        problems: Each thing wrong, in a sentence; a single one for errors raised while searching.
+        problems: Each fault, in a sentence; a single one for errors raised while searching.
     """
 
     def __init__(self, message: str, *, problems: Sequence[str] = ()) -> None:

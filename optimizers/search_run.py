@@ -324,7 +324,7 @@ class SearchRun:
         return [emitter for emitter in self.state.scheduler.emitters if hasattr(emitter, "done")]
 
     def goal(self) -> tuple[int, str]:
-        """What the progress bar counts up to, and its unit."""
+        """The number that the progress bar counts up to, and its unit."""
         if self.evaluations is not None:
             return self.evaluations, "evaluations"
         assert self.iterations is not None

@@ -1,4 +1,4 @@
-"""What every goal predictor can do, in the manner of scikit-learn.
+"""The interface of every goal predictor, in the manner of scikit-learn.
 
 A sample is a :class:`~legible_envs.rollouts.Trajectory` (a complete one, or a prefix of one); the columns of
 probabilities are ``classes_``, and each row is zero outside the trajectory's own candidates.
@@ -35,7 +35,7 @@ __all__ = [
 ]
 
 TieCredit = Literal["fractional", "strict"]
-"""What a true goal counts that shares the top with others; see :func:`correctness`."""
+"""How a true goal counts that shares the top with others; see :func:`correctness`."""
 
 FRACTIONS: Final = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
 """Fractions observed at which predictors are evaluated by default."""

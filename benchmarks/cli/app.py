@@ -30,7 +30,7 @@ class _Commands(click.Group):
 CONTENTS = {
     "Search": ("optimize", "report"),
     "Layouts": ("score", "show", "play"),
-    "People and predictors": ("humans fetch", "humans stats", "humans evaluate"),
+    "Participants and predictors": ("humans fetch", "humans stats", "humans evaluate"),
     "Experiments": ("sweep", "reproduce", "bench"),
     "About": ("demo", "workspaces", "emitters"),
 }
@@ -275,7 +275,7 @@ def score(
         if ctx.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT
     ]
     if predictors and trajectories is None:
-        raise click.UsageError("--predictor needs --trajectories: what to evaluate it on")
+        raise click.UsageError("--predictor needs --trajectories to evaluate it on")
     if given and not predictors:
         raise click.UsageError(f"--{given[0].replace('_', '-')} is about --predictor, which is not given")
     design = load_design(layout, workspace=workspace, prefix=prefix, pots=pots, task=task)
@@ -335,12 +335,12 @@ def play(layout: str, fps: int, record: Path | None) -> None:
         click.echo(f"recorded: {record}")
 
 
-# -- people, demonstration, speed -----------------------------------------------------------------------------
+# -- recordings, demonstration, speed -------------------------------------------------------------------------
 
 
 @main.group(cls=_Commands)
 def humans() -> None:
-    """Fetch recorded people, and evaluate predictors on them."""
+    """Fetch recordings of people, and evaluate predictors on them."""
 
 
 @humans.command()
@@ -361,7 +361,7 @@ def fetch(source: Path | None, out: Path | None) -> None:
 @click.option("--from", "folder", type=click.Path(exists=True, file_okay=False, path_type=Path),
               help="The folder `legible humans fetch --out` wrote.")  # fmt: skip
 def stats(folder: Path | None) -> None:
-    """Count games, people, transitions and trajectories."""
+    """Count games, participants, transitions and trajectories."""
     from benchmarks.console import say, table
     from legible_envs.datasets.overcooked_2019 import recording_stats
 
@@ -379,7 +379,7 @@ def demo(out: Path, seed: int, offline: bool) -> None:
     """Search, compare, predict: the whole in a minute.
 
     Searches a legible kitchen, compares it with a random and an efficient one, and predicts the goals of recorded
-    people.
+    participants.
     """
     from benchmarks.cli.demo import run_demo
     from benchmarks.console import say

@@ -1,7 +1,7 @@
 """``legible demo``: the project's main job, on real input, in under a minute.
 
 Search a legible kitchen, set it beside a random one and the efficient one, and measure how well predictors predict the
-goals of recorded people.
+goals of recorded participants.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ def run_demo(
         raise ValueError(f"no layout scored in {evaluations:,} evaluations; allow more")
     with _step(console, "Searching the efficient kitchen, drawing random ones"):
         found = make_panels(workspace, result.best_genome, seed=seed, evaluations=efficient_evaluations)
-    with _step(console, "Predicting the goals of recorded people"):
+    with _step(console, "Predicting the goals of recorded participants"):
         people = recorded_play(fetch=not offline)
     write_best_image(out)
     image = write_panels_image(out, workspace, found)
@@ -85,7 +85,7 @@ def run_demo(
     console.print()
     if people.get("table"):
         rows_of_table = [dict(zip(people["table"]["columns"], row, strict=True)) for row in people["table"]["rows"]]
-        console.print("Recorded people: goals predicted correctly", style="bold")
+        console.print("Recorded participants: goals predicted correctly", style="bold")
         console.print(table(rows_of_table))
     console.print(people["note"], style="dim")
     console.print(f"\npicture {image}\nreport  {page}")
@@ -153,7 +153,7 @@ def write_panels_image(out: Path, workspace: OvercookedWorkspace, found: list[Pa
 
 
 def recorded_play(folder: Path | None = None, *, fetch: bool = True) -> dict[str, Any]:
-    """How well two predictors predict recorded people's goals.
+    """How well two predictors predict recorded participants' goals.
 
     In the form that :func:`~benchmarks.reports.search_report.write_report` takes.
 
@@ -180,7 +180,7 @@ def recorded_play(folder: Path | None = None, *, fetch: bool = True) -> dict[str
 
 
 def _summed_up(scores: pd.DataFrame) -> dict[str, Any]:
-    """Accuracy by share observed over all walks, and by kitchen over all shares."""
+    """Accuracy by share observed over all trajectories, and by kitchen over all shares."""
     kitchens, predictors = list(scores["layout"].unique()), list(scores["predictor"].unique())
     weighted = scores.assign(hits=scores["accuracy"] * scores["walks"])
     summed = weighted.groupby(["predictor", "fraction"], sort=False)[["hits", "walks"]].sum()

@@ -51,7 +51,7 @@ def evaluate_predictors(
     repeats: int = 3,
     out: Path | None = None,
 ) -> None:
-    """Evaluate predictors on recorded people, and print and write the tables.
+    """Evaluate predictors on recorded participants, and print and write the tables.
 
     Args:
         console: Where to print.

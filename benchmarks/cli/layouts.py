@@ -1,4 +1,4 @@
-"""What ``legible score`` and ``legible show`` say about one layout."""
+"""Output of ``legible score`` and ``legible show`` about one layout."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ WORST_ROWS, BEST_ROWS = 10, 3
 
 
 def score_lines(design: Design) -> list[str]:
-    """The score of a layout as lines of ``name value``, for people and for ``grep``."""
+    """The score of a layout as lines of ``name value``, for users and for ``grep``."""
     return [f"{name:<15} {value}" for name, value in design.facts()]
 
 

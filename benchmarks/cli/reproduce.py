@@ -1,4 +1,4 @@
-"""``legible reproduce``: the paper's experiments, and others that need simulated people."""
+"""``legible reproduce``: the paper's experiments, and others that need simulated participants."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def _run_part(module: str, folder: Path, how: Mapping[str, Any]) -> list[Section
     try:
         importlib.import_module(module).reproduce(folder, **how)
     except RecordingsError as error:
-        return [Section("Recorded people", f"Left out: {error}")]
+        return [Section("Recorded participants", f"Left out: {error}")]
     return list(importlib.import_module(f"{module}.analysis").sections(folder))
 
 

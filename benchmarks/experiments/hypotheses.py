@@ -1,4 +1,4 @@
-"""The hypotheses of the paper as explicit tests: does the workspace help, early, with less data, whichever predicts?
+"""The hypotheses of the paper as explicit tests: does the workspace help, early, with less data, with every predictor?
 
 The paper (Tung et al., HRI 2024) claims in its abstract that optimised workspaces give "higher robot prediction
 accuracy using less training data", and that the gain is "classifier-agnostic". H1, H2 and H3 below put these claims,

@@ -1,4 +1,4 @@
-"""What all experiments do alike: run trials, log their rows, and take as many layouts as asked for."""
+"""Steps that all experiments share: run trials, log their rows, and take as many layouts as asked for."""
 
 from __future__ import annotations
 

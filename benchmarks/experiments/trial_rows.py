@@ -101,7 +101,7 @@ def curve_rows(
             :func:`predictors.evaluation.learning_curve`.
 
     Raises:
-        ValueError: Splits whose smallest training set mentions every goal are not to be had.
+        ValueError: There are no splits whose smallest training set mentions every goal.
     """
     from predictors.evaluation.cross_validation import learning_curve
 

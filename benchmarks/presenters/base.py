@@ -1,4 +1,4 @@
-"""What the command line and the report need to know about a workspace: how its layouts are named, printed and drawn.
+"""How the command line and the report show a workspace: how its layouts are named, printed and drawn.
 
 A presenter knows one workspace; everything else that ``legible`` does is the same for all of them. A workspace without
 a presenter of its own is presented by :class:`Presenter` itself: its layouts as text, its summary as facts, no picture.
@@ -86,7 +86,7 @@ class ReportTexts:
         archive: Ends the sentence "Each square is the best layout found …".
         panels: What the layouts side by side have in common, and what to look for.
         best: Which layouts "The best layouts" shows.
-        distance: What the distance is.
+        distance: Name of the distance.
         distance_unit: Its unit; empty where it has none.
         distance_digits: Decimals of a distance.
         made: Over what the legibility (Eq. 2 and 3) is averaged; empty where it is not that of the equations.
@@ -126,7 +126,7 @@ class Design:
 
     @property
     def noun(self) -> str:
-        """What a layout is called."""
+        """The word for a layout."""
         return "layout" if self.presenter is None else self.presenter.noun
 
     @property
@@ -204,7 +204,7 @@ class Part:
     Attributes:
         folder: Where it is written.
         workspace: What it searches.
-        title: What it is called where there are several; else empty.
+        title: Its name where there are several; else empty.
     """
 
     folder: Path
@@ -222,7 +222,7 @@ class Presenter:
 
     Attributes:
         name: Name of the workspace.
-        noun: What one layout is called.
+        noun: The word for one layout.
         options: Options of ``legible optimize`` that only this workspace has.
         texts: Texts of the report.
     """
@@ -301,7 +301,7 @@ class Presenter:
     # -- the page of a report --------------------------------------------------------------------------------------
 
     def place(self, workspace: Any) -> dict[str, Any]:
-        """What the script must know to draw layouts; plain data."""
+        """Plain data with which the script draws layouts."""
         return {}
 
     def encode(self, layout: Any) -> Any:

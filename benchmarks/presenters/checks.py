@@ -1,4 +1,4 @@
-"""What a presenter of another package gets wrong, in words."""
+"""Faults of a presenter of another package, in words."""
 
 from __future__ import annotations
 

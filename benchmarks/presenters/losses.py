@@ -1,4 +1,4 @@
-"""Rows of ``explain()``, where a layout wins and loses its score, for people who read them."""
+"""Rows of ``explain()``, where a layout wins and loses its score, in words."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ class Kitchen(Design):
         return self._scorer.explain_layout(self.layout)
 
     def ambiguity(self) -> npt.NDArray[np.float64]:
-        """``(H, W)`` how often an observer would name a wrong goal; NaN on cells that no path crosses."""
+        """``(H, W)`` how often an observer would predict a wrong goal; NaN on cells that no path crosses."""
         if self.genome is not None:
             return np.asarray(self.workspace.ambiguity(self.genome))
         return self._scorer.ambiguity(self.layout)
@@ -87,7 +87,7 @@ class Kitchen(Design):
         return kitchen_text(console, self.layout)
 
     def draw(self) -> Image:
-        """The kitchen with, on each cell, how often an observer would name a wrong goal."""
+        """The kitchen with, on each cell, how often an observer would predict a wrong goal."""
         from legible_envs.overcooked.rendering import draw_ambiguity
 
         return draw_ambiguity(self.layout, self.ambiguity(), tile=72, title="Where goals are confused")

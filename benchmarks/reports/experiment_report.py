@@ -37,7 +37,7 @@ def write_experiment_report(
         sections: The pieces, in order.
         title: Heading of the page.
         lede: A sentence or two below it.
-        eyebrow: What kind of page this is.
+        eyebrow: The kind of page.
     """
     from jinja2 import Environment
 

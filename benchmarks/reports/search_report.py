@@ -50,7 +50,7 @@ def write_report(
     Args:
         run_folder: The folder of a finished, interrupted or running search.
         panels: Layouts to show side by side; None shows those that the run itself compares, if any.
-        recorded_play: How well predictors predict recorded people's goals (see
+        recorded_play: How well predictors predict recorded participants' goals (see
             :func:`benchmarks.cli.demo.recorded_play`): ``note``, ``fractions``, ``curves`` (each ``label``,
             ``values``) and ``table`` (``columns``, ``rows``). None leaves the section out; a mapping with only a
             ``note`` says why there are no results.
@@ -329,7 +329,7 @@ def _figures(data: dict[str, Any], presenter: Presenter) -> list[tuple[str, str,
 
 
 def _settings(config: Mapping[str, Any]) -> list[tuple[str, list[tuple[str, str]]]]:
-    """The manifest as titled lists of name and value, for people."""
+    """The manifest as titled lists of name and value, for users."""
 
     def flat(value: Any, prefix: str = "") -> list[tuple[str, str]]:
         if isinstance(value, Mapping):

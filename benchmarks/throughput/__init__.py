@@ -1,1 +1,1 @@
-"""``legible bench``: how fast things are, as ratios within one run. See :mod:`benchmarks.throughput.sweep`."""
+"""``legible bench``: how fast everything is, as ratios within one run. See :mod:`benchmarks.throughput.sweep`."""

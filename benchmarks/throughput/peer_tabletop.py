@@ -76,10 +76,10 @@ def _nearest(start: Floats, centres: Floats, labels: Sequence[int], label: int) 
 
 def _straight(start: Floats, goal: Floats) -> Floats:
     """``(T, 2)`` points every 2 cm, the goal last."""
-    way = goal - start
-    length = np.linalg.norm(way)
+    line = goal - start
+    length = np.linalg.norm(line)
     steps = math.ceil(length / STEP)
-    unit = way / length
+    unit = line / length
     return np.array([*(start + i * STEP * unit for i in range(steps)), goal])[:MOST_POINTS]
 
 
@@ -94,17 +94,17 @@ def _likelihood(start: Floats, seen: Floats, goal: Floats) -> float:
 
 
 def straight_line_losses(start: Floats, centres: Floats, stages: Sequence[Sequence[int]]) -> Floats:
-    """``(B,)`` the same of ``(B, n, 2)`` tables at once; what was walked is in every term and cancels."""
+    """``(B,)`` the same of ``(B, n, 2)`` tables at once; the path so far is in every term and cancels."""
     losses = np.zeros(len(centres))
     shares = np.array(SHARES)
     for stage in stages:
         goals = centres[:, list(stage)]
-        ways = goals - start
-        lengths = np.sqrt((ways**2).sum(axis=-1))
+        lines = goals - start
+        lengths = np.sqrt((lines**2).sum(axis=-1))
         points = np.minimum(np.ceil(lengths / STEP) + 1, MOST_POINTS)
         last = (points[:, :, None] * shares).astype(np.int64) - 1
         seen = np.minimum(last * STEP / lengths[:, :, None], 1.0)
-        at = start + seen[..., None] * ways[:, :, None]
+        at = start + seen[..., None] * lines[:, :, None]
         left = np.sqrt(((at[:, :, :, None] - goals[:, None, None]) ** 2).sum(axis=-1))
         logits = np.where(last[..., None] >= 0, lengths[:, None, None] - left, 0.0)
         own = np.einsum("bgsg->bgs", logits)

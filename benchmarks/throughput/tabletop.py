@@ -134,7 +134,7 @@ def table_games(settings: Settings) -> list[Figure]:
     samplers["table player"] = _player(settings)
     samples = alternate(samplers, settings.rounds)
     figures = [Figure(key, what, "/s", samples[key]) for key, (what, _) in kinds.items()]
-    what = "the same, the simulated person decided and planned meanwhile"
+    what = "the same, while the simulated person decides and plans"
     return [*figures, Figure("table player", what, "/s", samples["table player"])]
 
 

@@ -32,7 +32,7 @@ class Outcome(NamedTuple):
 
 
 class Pool(Protocol):
-    """What runs trials: it takes them one by one and yields outcomes as they come."""
+    """Runs trials: takes them one by one and yields outcomes as they come."""
 
     def run(self, function: str, trials: Iterator[tuple[int, Trial]]) -> Iterator[Outcome | dict[str, Trial]]:
         """Outcomes in any order; between them, mappings of worker to trial whenever that changes."""

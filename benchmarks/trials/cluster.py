@@ -37,7 +37,7 @@ class ClusterPool:
         self._queue: deque[tuple[int, Trial]] = deque()
 
     def run(self, function: str, trials: Iterator[tuple[int, Trial]]) -> Iterator[Outcome | dict[str, Trial]]:
-        """See :class:`~benchmarks.trials.attempts.Pool`."""
+        """Outcomes in any order; between them, mappings of worker to trial whenever that changes."""
         from distributed import wait
 
         self._queue.extend(trials)
@@ -60,7 +60,7 @@ class ClusterPool:
             self._client.close()
 
     def again(self, number: int, trial: Trial) -> None:
-        """See :class:`~benchmarks.trials.attempts.Pool`."""
+        """Put a trial back at the end of the queue."""
         self._queue.append((number, trial))
 
     def _submit(self, function: str, running: dict[Any, tuple[int, Trial]]) -> None:
@@ -72,7 +72,7 @@ class ClusterPool:
             room -= 1
 
     def _working(self, running: dict[Any, tuple[int, Trial]]) -> dict[str, Trial]:
-        """What each worker is at: the first trial it was given and has not ended."""
+        """What each worker runs: the first trial that it was given and has not ended."""
         trials = {future.key: trial for future, (_, trial) in running.items()}
         return {
             worker: next(trials[key] for key in keys if key in trials)

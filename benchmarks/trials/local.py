@@ -27,7 +27,7 @@ class InProcess:
         self._queue: deque[tuple[int, Trial]] = deque()
 
     def run(self, function: str, trials: Iterator[tuple[int, Trial]]) -> Iterator[Outcome | dict[str, Trial]]:
-        """See :class:`~benchmarks.trials.attempts.Pool`."""
+        """Outcomes in any order; between them, mappings of worker to trial whenever that changes."""
         self._queue.extend(trials)
         while self._queue:
             number, trial = self._queue.popleft()
@@ -36,7 +36,7 @@ class InProcess:
         yield {}
 
     def again(self, number: int, trial: Trial) -> None:
-        """See :class:`~benchmarks.trials.attempts.Pool`."""
+        """Put a trial back at the end of the queue."""
         self._queue.append((number, trial))
 
 
@@ -55,7 +55,7 @@ class LocalPool:
         self._executors = {f"process {i + 1}": _executor() for i in range(workers)}
 
     def run(self, function: str, trials: Iterator[tuple[int, Trial]]) -> Iterator[Outcome | dict[str, Trial]]:
-        """See :class:`~benchmarks.trials.attempts.Pool`."""
+        """Outcomes in any order; between them, mappings of worker to trial whenever that changes."""
         self._queue.extend(trials)
         running: dict[Future[Outcome], tuple[str, int, Trial]] = {}
         try:
@@ -75,7 +75,7 @@ class LocalPool:
             self._stop()
 
     def again(self, number: int, trial: Trial) -> None:
-        """See :class:`~benchmarks.trials.attempts.Pool`."""
+        """Put a trial back at the end of the queue."""
         self._queue.append((number, trial))
 
     def _outcome(self, future: Future[Outcome], worker: str, number: int) -> Outcome:

@@ -29,7 +29,7 @@ class Event:
         found: Those found on disk.
         failed: Trials given up.
         retried: Attempts that failed and were repeated.
-        running: What each worker is at: its name and the trial.
+        running: What each worker runs: its name and the trial.
         last: The newest outcome, if any.
     """
 

@@ -3,7 +3,7 @@
     python docs/_ext/animations.py    # writes these three, about ten seconds
 
 - ``docs/images/prediction.gif``: one person fetches the same ingredients in two kitchens, and an observer's belief;
-- ``docs/images/kitchen.gif``: ``LegibleOvercooked-v0`` with the scripted cook;
+- ``docs/images/kitchen.gif``: ``LegibleOvercooked-v0`` with the scripted player;
 - ``docs/images/table.gif``: ``LegibleTabletop-v0`` with a simulated participant.
 
 All are seeded: a second run writes the same bytes. The pages of the environments show the last two as well.

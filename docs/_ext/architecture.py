@@ -2,7 +2,7 @@
 
     python docs/_ext/architecture.py    # writes docs/images/architecture.svg and docs/_rooms.md
 
-What is drawn above may import what is drawn below: the floors are those of `[tool.importlinter]` in pyproject.toml, so
+A box may import the boxes below it: the floors are those of `[tool.importlinter]` in pyproject.toml, so
 that the picture tells what `make lint` enforces. The sentence of a room is the first of its docstring.
 """
 

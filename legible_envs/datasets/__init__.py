@@ -1,1 +1,1 @@
-"""Real people: recorded kitchens (Overcooked-AI, 2019) and pointing movements, as trajectories."""
+"""Recordings of real people: kitchens (Overcooked-AI, 2019) and pointing movements, as trajectories."""

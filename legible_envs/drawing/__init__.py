@@ -1,4 +1,4 @@
-"""What drawings of kitchens and of tables share: paper, titles, sheets of pictures, and a window to show them in."""
+"""Shared by drawings of kitchens and of tables: paper, titles, sheets of pictures, and a window to show them in."""
 
 from legible_envs.drawing.canvas import Image, load_pygame
 from legible_envs.drawing.palette import HEAT, PAGE

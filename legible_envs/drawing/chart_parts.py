@@ -1,4 +1,4 @@
-"""What stands on a chart: axes with round ticks, lines with names at their ends, numbered squares, legends."""
+"""Parts of a chart: axes with round ticks, lines with names at their ends, numbered squares, legends."""
 
 from __future__ import annotations
 

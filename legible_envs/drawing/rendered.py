@@ -1,4 +1,4 @@
-"""What every environment here does with its pictures: hand them out, or show them in a window of its own."""
+"""Pictures of every environment here: handed out, or shown in a window."""
 
 from __future__ import annotations
 

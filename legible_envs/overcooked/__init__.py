@@ -1,4 +1,4 @@
-"""The kitchen: layouts, the workspace of their design, the playable game, and people in it."""
+"""The kitchen: layouts, the workspace of their design, the playable game, and participants in it."""
 
 import lazy_loader as lazy
 

@@ -1,4 +1,4 @@
-"""Cook in a kitchen yourself: a window, a keyboard, and a record of what was done."""
+"""Cook in a kitchen yourself: a window, a keyboard, and a record of the game."""
 
 from __future__ import annotations
 

@@ -71,11 +71,11 @@ class ScriptedPlayer:
         return np.array([self._act(i, arrays[i], *(info[key][i] for key in keys)) for i in range(self.num_envs)])
 
     def goal(self, index: int = 0) -> tuple[int, int] | None:
-        """``(row, col)`` of the goal walked to in a game, None between goals."""
+        """``(row, col)`` of the goal that the player walks to in a game, None between goals."""
         return None if self._goals[index] < 0 else divmod(self._goals[index], self._width)
 
     def _has_goal(self, index: int, goal_mask: npt.NDArray[np.bool_], layout_id: str) -> bool:
-        """Whether there is something to walk to; where the last goal is no longer valid, another is drawn."""
+        """Whether there is a goal to walk to; if the last one is no longer valid, another is drawn."""
         marked = goal_mask.ravel()
         if layout_id == self._layout_ids[index] and self._goals[index] >= 0 and marked[self._goals[index]]:
             return True
@@ -163,10 +163,10 @@ class WalkingPlayer(ScriptedPlayer):
     def __init__(self, env: Any, walker: Walker, rng: np.random.Generator) -> None:
         super().__init__(env, rng)
         self.walker = walker
-        self._walks: list[_Walk | None] = [None] * len(self._goals)
+        self._paths: list[_Path | None] = [None] * len(self._goals)
 
     def _forget_path(self, index: int) -> None:
-        self._walks[index] = None
+        self._paths[index] = None
 
     def _act(
         self,
@@ -180,19 +180,19 @@ class WalkingPlayer(ScriptedPlayer):
         if not self._has_goal(index, goal_mask, layout_id):
             return STAY
         cell, facing = int(state[AT_PLAYERS]), int(state[AT_PLAYERS + 1])
-        walk = self._walks[index]
-        if walk is None or not walk.leads_from(cell):
+        path = self._paths[index]
+        if path is None or not path.leads_from(cell):
             floors = self._find_floors(index, kitchen, rules)
-            walk = self._walks[index] = _Walk(
+            path = self._paths[index] = _Path(
                 self.walker, cell, self._goals[index], floors, (self._height, self._width)
             )
         u = self.rng.random()
         if u < self.walker.idle:
             return STAY
         if u < self.walker.idle + self.walker.turn:
-            towards = walk.look_around(cell, self.rng.random())
+            towards = path.look_around(cell, self.rng.random())
             return STAY if towards < 0 else towards
-        direction = walk.next_direction(cell, self.walker, self.rng)
+        direction = path.next_direction(cell, self.walker, self.rng)
         if neighbour(cell, direction, self._height, self._width) != self._goals[index] or facing != direction:
             return direction
         if not action_mask[INTERACT]:
@@ -201,7 +201,7 @@ class WalkingPlayer(ScriptedPlayer):
         return INTERACT
 
 
-class _Walk:
+class _Path:
     """One person's path to one goal in a running game, and the last decision on it."""
 
     def __init__(
@@ -229,7 +229,7 @@ class _Walk:
         return int(look_around(cell, self.field.height, self.field.width, self._open, u))
 
     def next_direction(self, cell: int, walker: Walker, rng: np.random.Generator) -> int:
-        """Decide once at each cell: a person who turns to the goal does not think again before using it."""
+        """Decide once at each cell: a person who turns to the goal uses it without another decision."""
         if self._decided is None or self._decided[0] != cell:
             if self._decided is not None:
                 self._heading = self._decided[1]

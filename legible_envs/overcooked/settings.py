@@ -1,4 +1,4 @@
-"""What a kitchen environment was asked to be: arguments checked once, shared by the single and the batched one."""
+"""Settings of a kitchen environment: arguments checked once, shared by the single and the batched one."""
 
 from __future__ import annotations
 

@@ -96,7 +96,7 @@ def _without_repeats(cells: npt.NDArray[np.integer], first: int) -> tuple[tuple[
 
 
 def dispensers_in_reach(layout: OvercookedLayout, cell: Sequence[int]) -> tuple[str, ...]:
-    """Ingredient and dish stations that can be walked to from a floor cell, in reading order: candidates ``all``."""
+    """Ingredient and dish stations within reach of a floor cell, in reading order: candidates ``all``."""
     away = layout.distances_from([cell])
     return tuple(
         name

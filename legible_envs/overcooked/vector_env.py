@@ -412,7 +412,7 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
         return infos
 
     def _finish(self, done: npt.NDArray[np.bool_], masks: npt.NDArray[np.int8]) -> Infos:
-        """What a game that is over and started anew in the same step leaves behind."""
+        """The last results of a game that ends and starts again in the same step."""
         observations = self._observe()
         final = np.full(self.num_envs, None, dtype=object)
         for i in np.flatnonzero(done):

@@ -1,4 +1,4 @@
-"""Rollouts and trajectories: what they are, how they are recorded, and the files that keep them (npz, CSV, Minari).
+"""Rollouts and trajectories: their types, how they are recorded, and the files that keep them (npz, CSV, Minari).
 
 >>> from legible_envs.rollouts import RecordTrajectories, write_csv
 >>> env = RecordTrajectories(gym.make("LegibleOvercooked-v0"))      # doctest: +SKIP

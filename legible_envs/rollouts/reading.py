@@ -31,7 +31,7 @@ def register_trajectory_format(name: str, read: TrajectoryFormat, *, overwrite: 
     """Let :func:`read_any` read another format, for the rest of this process.
 
     Args:
-        name: What the format is called.
+        name: Of the format.
         read: Called with a path; returns the trajectories in the file, or None where it has another format.
         overwrite: Whether it may replace an earlier registration of that name.
 

@@ -46,7 +46,7 @@ class RecordTrajectories(gym.Wrapper, gym.utils.RecordConstructorArgs):  # type:
     """Keeps every episode, and the trajectories in it: of a policy, a learner, ``gymnasium.utils.play``.
 
     Works with every environment whose ``unwrapped`` has ``trajectories(participant=…, condition=…)`` and ``layout``:
-    ``LegibleOvercooked-v0`` (walks to stations) and ``LegibleTabletop-v0`` (reaches for objects).
+    ``LegibleOvercooked-v0`` (trajectories to stations) and ``LegibleTabletop-v0`` (reaches for objects).
 
     Args:
         env: The environment, wrapped or not.

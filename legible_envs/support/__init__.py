@@ -1,1 +1,1 @@
-"""What every package may use and what knows of no kitchen, table or person: compiling, files, plug-ins, validation."""
+"""Tools for every package, without any domain: compiling, files, plug-ins, validation."""

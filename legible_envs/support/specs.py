@@ -1,4 +1,4 @@
-"""What every environment here does with its arguments: a spec that stays JSON, and options that are checked."""
+"""Arguments of every environment here: a spec that stays JSON, and options that are checked."""
 
 from __future__ import annotations
 

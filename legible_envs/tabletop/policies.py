@@ -37,8 +37,8 @@ class ReachingPlayer:
     Each movement is a reach of this person that begins where the hand is when it is planned. The hand follows it sample
     by sample; where it ends beside its target, shorter reaches correct it (as in Meyer et al., 1988). The player sets
     the drawn goal in the environment (``env.unwrapped.goal``), so that the hand takes no other object meanwhile; robots
-    do not see it. If the robot takes the goal first the person draws another, and waits where there is none. People who
-    cross obstacles do so where these are soft; hard ones stop them, and they correct.
+    do not see it. If the robot takes the goal first the person draws another, and waits where there is none. A person
+    who crosses obstacles does so where these are soft; hard ones stop the hand, and the person corrects.
 
     Args:
         env: An environment made by ``gymnasium.make("LegibleTabletop-v0")``, wrapped or not. A reset is noticed. In a

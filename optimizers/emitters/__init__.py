@@ -1,1 +1,1 @@
-"""Emitters: what proposes the next layouts. The contract for your own is in :mod:`optimizers.emitters.registry`."""
+"""Emitters propose the next layouts. The contract for your own is in :mod:`optimizers.emitters.registry`."""

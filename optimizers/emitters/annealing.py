@@ -45,7 +45,7 @@ class AnnealingEmitter(WorkspaceEmitter):
     good kitchen are: a wall has to open before it can close elsewhere. An annealed chain (Kirkpatrick et al., 1983)
     makes one random change at a time and accepts a loss ``d`` with probability ``exp(-d / temperature)``; as it cools
     it settles in ever deeper valleys. One evaluation buys one step, where a climb pays for a whole fan of perturbations
-    to take one. All layouts met on the way are offered to the archive, so that hot chains explore it and cold ones
+    to take one. The archive gets every layout on the path, so that hot chains explore it and cold ones
     refine it. ``resamplings`` times a cycle, chains are drawn anew among themselves in proportion to how much the lower
     temperature favours where they stand (Hukushima & Iba, 2003; here by systematic resampling): those in hopeless
     valleys give their evaluations to those in promising ones.

@@ -67,7 +67,7 @@ class WorkspaceEmitter(EmitterBase):
         """
 
     def _blank_genomes(self, n: int = 0) -> npt.NDArray[Any]:
-        """``(n, d)`` zeros of the type of genomes: what a population is before it begins."""
+        """``(n, d)`` zeros of the type of genomes: a population before it begins."""
         return np.zeros((n, int(self.solution_dim)), dtype=self.archive.dtypes["solution"])
 
 

@@ -24,7 +24,7 @@ def check_emitter(
 ) -> None:
     """Run an emitter for a few batches and check everything a search relies on.
 
-    That it can be made, proposes numbers of the right shape, stays within bounds (and is valid, if it claims
+    The emitter can be made, proposes numbers of the right shape, stays within bounds (and is valid, if it claims
     ``emits_valid``), takes results that include layouts without a score, repeats itself with the same seed and not
     with another, leaves the global random state and the archive alone, and pickles in mid-search.
 

@@ -123,12 +123,12 @@ class CmaMeEmitter(_KeyStrategies):
 
 
 class CmaMaeEmitter(_KeyStrategies):
-    """CMA-MAE: as CMA-ME, but toward what improves a threshold that each cell raises slowly, on random keys.
+    """CMA-MAE: CMA-ME on random keys that climbs above a threshold, which rises slowly in each cell.
 
-    A private archive keeps, for each cell, a threshold that moves by ``learning_rate`` of the way toward whatever
-    passes it (Fontaine & Nikolaidis, 2023); strategies rank by how far a layout is above it, take the better half as
-    parents, and start again from a random elite only when they have converged. Thresholds begin at the median score of
-    the elites found when the emitter first proposes.
+    A private archive keeps, for each cell, a threshold that moves by ``learning_rate`` of the difference toward
+    each score above it (Fontaine & Nikolaidis, 2023); strategies rank by how far a layout is above it, take the better
+    half as parents, and start again from a random elite only when they have converged. Thresholds begin at the median
+    score of the elites found when the emitter first proposes.
 
     Args:
         archive: Archive of the search; keeps the best of every cell as always.

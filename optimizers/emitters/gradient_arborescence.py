@@ -56,7 +56,7 @@ class GradientArborescenceEmitter(GenomeAdapter):
 
     Raises:
         ValueError: The workspace has no gradients, or another argument is out of range.
-        ImportError: What the workspace computes gradients with is not installed.
+        ImportError: A package that the workspace computes gradients with is missing.
     """
 
     def __init__(

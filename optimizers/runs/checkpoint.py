@@ -161,7 +161,7 @@ class CheckpointFolder:
 
 
 class _Damaged(Exception):
-    """A checkpoint file is not what was written."""
+    """A checkpoint file is damaged."""
 
 
 def _read(path: Path) -> tuple[Header, bytes]:

@@ -1,6 +1,6 @@
 """Whether conditions or predictors differ: tables of values in, tables of tests out.
 
-What is tested are *units* that are independent of one another. Folds of one cross-validation share their data: with
+Tests compare *units* that are independent of one another. Folds of one cross-validation share their data: with
 4 folds x 3 repeats as units, a true null hypothesis is rejected about every second time. The default unit is therefore
 the participant, whose values are averaged first. The tests themselves are in :mod:`predictors.evaluation.statistics`.
 """
@@ -51,7 +51,7 @@ class Comparison:
         design: ``"between"`` (other units in each condition) or ``"within"`` (the same ones in all).
         alpha: Level of the bands and intervals.
         dropped: Units that were left out because a condition lacks them.
-        definition: What the values are, if the evaluation said so.
+        definition: Of the values, if the evaluation gave one.
     """
 
     anova: pd.DataFrame = field(repr=False)

@@ -29,8 +29,8 @@ class Encoding:
         grid: Whether states are cells ``(row, col)``.
         dimension: Number of coordinates ``d`` of a state.
         shape: Rows and columns of the smallest grid that holds every cell; empty for positions.
-        scale: What positions are divided by.
-        stride: What the displacement between neighbouring states is divided by.
+        scale: Divisor of positions.
+        stride: Divisor of the displacement between neighbouring states.
         starts: Names of the starts seen.
         layouts: Identifiers of the kitchens seen, if more than one.
     """

@@ -113,14 +113,14 @@ def draw_reaches(
     Args:
         gaussian: A fitted predictor of reaches in the plane.
         size: Width and height in pixels.
-        deviations: See :func:`ellipse_table`.
-        every: See :func:`ellipse_table`.
+        deviations: Half-axes in standard deviations; 2 covers 86 % of positions.
+        every: Every how many steps an ellipse is drawn; the last step is included.
 
     Returns:
         ``(size, size, 3)`` RGB.
 
     Raises:
-        ValueError: See :func:`ellipse_table`.
+        ValueError: Reaches that are not in the plane, or arguments out of range.
     """
     from PIL import Image, ImageDraw
 

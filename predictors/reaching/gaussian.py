@@ -268,7 +268,7 @@ class TimeSeriesGaussian(GoalPredictor):
         return np.minimum(np.maximum(steps - radius, 0), np.minimum(before, last)), highs
 
     def _decays(self, gaps: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        """What earlier samples' weight is multiplied by after so many seconds."""
+        """The factor of earlier samples' weight after so many seconds."""
         if self.half_life is None:
             return np.ones_like(gaps)
         return np.exp2(-gaps / self.half_life) if self.half_life > 0 else np.zeros_like(gaps)

@@ -1,4 +1,4 @@
-"""What a reach seen so far is like, goal by goal: open-end alignment and Gaussian densities. Kernels on plain arrays.
+"""Likelihoods of a reach seen so far, by goal: open-end alignment and Gaussian densities. Kernels on plain arrays.
 
 Open-end warping (Tormene et al., 2009) matches all samples so far to some beginning of the reference. It is computed
 row by row, so that a new sample costs O(K) whatever came before.
@@ -41,7 +41,7 @@ def advance(
         reference: ``(K, d)`` or wider; the first ``d`` columns are aligned to.
         low: First step allowed for this sample.
         high: One past the last.
-        decay: What earlier samples' weight is multiplied by.
+        decay: Factor of earlier samples' weight.
         cost: ``(K,)`` in and out.
         total: ``(K,)`` in and out.
         weight: ``(K,)`` in and out.

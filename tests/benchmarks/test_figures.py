@@ -169,11 +169,15 @@ def test_every_stage_is_a_dot():
 def test_every_correlation_has_both_intervals():
     figure = correlation_figure(correlations(), "T")
     (axes,) = figure.axes
-    drawn = {name: [] for name in ("places", "people", "rho")}
+    drawn = {name: [] for name in ("places", "participants", "rho")}
     for line in axes.lines:
         if line.get_label() in drawn:
             drawn[line.get_label()].append(np.asarray(line.get_xdata()).ravel().tolist())
-    assert drawn == {"places": [[0.1, 0.9], [-0.9, 0.3]], "people": [[0.4, 0.6], [-0.4, 0.1]], "rho": [[0.5], [-0.2]]}
+    assert drawn == {
+        "places": [[0.1, 0.9], [-0.9, 0.3]],
+        "participants": [[0.4, 0.6], [-0.4, 0.1]],
+        "rho": [[0.5], [-0.2]],
+    }
     labels = axes.get_yticklabels()
     assert [label.get_text() for label in labels] == ["Eq. 1, all in reach", "Eq. 1, of use in the game"]
     assert [label.get_color() for label in labels] == list(COLOURS[:2])

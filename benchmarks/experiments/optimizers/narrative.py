@@ -1,4 +1,4 @@
-"""What the tables say: the figures behind the sentences of ``templates/experiments/optimizers``."""
+"""The figures behind the sentences of ``templates/experiments/optimizers``."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def about_optimum(gap: pd.DataFrame) -> str:
 
 
 def about_local_search() -> str:
-    """What a plain local search is."""
+    """How a plain local search works."""
     return narrate("optimizers/local_search")
 
 

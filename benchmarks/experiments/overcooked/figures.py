@@ -29,8 +29,8 @@ TILE: Final = 44
 LEGIBLE_FIRST: Final = tuple(reversed(CONDITIONS))
 """The legible condition is the one to look for."""
 _NOTE: Final = (
-    "Simulated people; cross-validated; only trajectories with two valid goals or more. Two bands that do not overlap "
-    "are a difference by Tukey's test at that point."
+    "Simulated participants; cross-validated; only trajectories with two valid goals or more. Two bands that do not "
+    "overlap are a difference by Tukey's test at that point."
 )
 
 
@@ -139,7 +139,7 @@ def boards(best: pd.DataFrame) -> Any:
 
 
 def rewards(best: pd.DataFrame, costs: pd.DataFrame, predictor: str) -> Any:
-    """What each cell is worth to the people in the layouts shown, as inverse reinforcement learning sees it."""
+    """What each cell is worth to the participants in the layouts shown, as inverse reinforcement learning sees it."""
     from legible_envs.overcooked import OvercookedLayout
     from legible_envs.overcooked.rendering import draw_ambiguity, draw_side_by_side
 
@@ -170,10 +170,10 @@ def draw_all(results: tables.Results, folder: Path) -> dict[str, list[Path]]:
     published = bars_by_condition(
         tables.beside_published(tables.metrics_table(results), first),
         {
-            "f1, paper": "people of the paper",
+            "f1, paper": "participants of the paper",
             **{f"f1, {name}": f"{name} (simulated)" for name in results.walkers},
         },
-        "F1 by condition, the paper's people and ours",
+        "F1 by condition, the paper's participants and ours",
         f"ours: {first}, mean over 10 to 90 % observed",
         "The paper's figures are of human participants and one layout per condition; see the text.",
     )
@@ -213,7 +213,7 @@ def _accuracy_figures(results: tables.Results, folder: Path) -> list[Path]:
                 each,
                 LEGIBLE_FIRST,
                 float(rows[rows["predictor"] == predictor]["chance"].mean()),
-                f"{predictor}, {walker} people",
+                f"{predictor}, {walker} participants",
                 f"mean over {int(each.means['n'].min())} layouts per condition; bands: Tukey's half-width over layouts",
                 _NOTE,
             )

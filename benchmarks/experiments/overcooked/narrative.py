@@ -1,4 +1,4 @@
-"""What the tables say: the figures behind the sentences of ``templates/experiments/overcooked``."""
+"""The figures behind the sentences of ``templates/experiments/overcooked``."""
 
 from __future__ import annotations
 

@@ -69,7 +69,7 @@ def reproduce(
 
 
 def _num_recorded() -> int:
-    """How many recorded trajectories there are to fit people to."""
+    """How many recorded trajectories there are to fit participants to."""
     from legible_envs.datasets.overcooked_2019 import RecordingsError, recorded_trajectories
 
     try:
@@ -120,7 +120,7 @@ def find_layout(trial: dict[str, Any]) -> Rows:
 
 @trial_function(TrialName("overcooked/people", (f"{_FORMER}:fit_people",)))
 def fit_people(trial: dict[str, Any]) -> Rows:
-    """One kind of walker fitted to the recorded people: a row for all of them, and one for each."""
+    """One kind of walker fitted to the recorded participants: a row for all of them, and one for each."""
     from legible_envs.datasets.overcooked_2019 import recorded_trajectories
     from legible_envs.overcooked.humans.planner_fitting import fit_boltzmann, fit_planner
 

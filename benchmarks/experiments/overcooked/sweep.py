@@ -41,7 +41,7 @@ PUBLISHED: Final[Mapping[str, Mapping[str, float]]] = {
     "Legible-Efficient": {"f1": 0.744, "precision": 0.792, "recall": 0.751},
     "Legible": {"f1": 0.799, "precision": 0.824, "recall": 0.812},
 }
-"""Tung et al. (HRI 2024), people in the Overcooked study: weighted means over goals."""
+"""Tung et al. (HRI 2024), participants in the Overcooked study: weighted means over goals."""
 
 PREFERENCE: Final = 0.2
 """Spread of the log cost that each cell has for each person. An assumption: recorded trajectories are too few to fit
@@ -62,9 +62,9 @@ FITTED: Final[Mapping[str, Any]] = {
         ],
     },
 }  # fmt: skip
-"""People for where the recordings are absent; what :mod:`.planner_fitting` fitted to them."""
+"""Participants for where the recordings are absent; what :mod:`.planner_fitting` fitted to them."""
 FITTED_SOURCE: Final = (
-    "2,406 trajectories of 34 people in four kitchens, "
+    "2,406 trajectories of 34 participants in four kitchens, "
     "Overcooked-AI's published games of 2019 (Carroll et al., NeurIPS 2019)"
 )
 
@@ -149,7 +149,7 @@ def fit_trials(recorded: int) -> list[dict[str, Any]]:
 
 
 def people_of(fits: pd.DataFrame) -> dict[str, dict[str, Any]]:
-    """People as plain data for trials, by kind of walker.
+    """Participants as plain data for trials, by kind of walker.
 
     Args:
         fits: Rows of :func:`fit_trials`; empty where there are no recordings, which gives ``FITTED``.

@@ -35,7 +35,7 @@ class Results:
     Attributes:
         layouts: A row per layout.
         elites: A row per cell of the archive of each search.
-        fits: What was fitted to recorded people; empty without recordings.
+        fits: What was fitted to recorded participants; empty without recordings.
         readings: ``accuracy``, ``metrics``, ``confusion`` and ``cost`` rows.
         curves: Learning curves.
     """

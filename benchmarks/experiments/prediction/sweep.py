@@ -24,7 +24,7 @@ __all__ = [
 
 
 LAYOUTS: Final = ("asymmetric_advantages", "coordination_ring", "cramped_room", "random3")
-"""Recorded kitchens in which people walk to dispensers; in ``random0`` ingredients are handed across a counter."""
+"""Recorded kitchens in which players walk to dispensers; in ``random0`` they hand ingredients across a counter."""
 
 UNTRAINED: Final = (
     PredictorSetting("shortest distance", "shortest-distance", {"metric": "manhattan"}),
@@ -84,7 +84,7 @@ POINTING_REFERENCE: Final[Mapping[str, float]] = {
     "logistic": 0.776,
     "GRU": 0.798,
 }
-"""Mean accuracy over 10..90 % on 1,258 movements of 53 people, measured before with other implementations."""
+"""Mean accuracy over 10..90 % on 1,258 movements of 53 participants, measured before with other implementations."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Is the legibility score a predictor of how well real people are predicted? Settings, run and analysis."""
+"""Does the legibility score tell how well the goals of real people are predicted? Settings, run and analysis."""
 
 import lazy_loader as lazy
 

@@ -54,7 +54,7 @@ def sections(folder: str | Path, *, bootstraps: int = BOOTSTRAPS) -> list[Sectio
     figures = draw_all(places["stage"], correlations, folder / "figures")
     return [
         Section(
-            "Recorded people: does the score tell how predictable they are?",
+            "Recorded participants: does the score tell how predictable they are?",
             about_correlations(correlations),
             {"Rank correlation of legibility with accuracy": correlations, "By kitchen": kitchens},
             figures,
@@ -146,7 +146,7 @@ def correlate(
         score, candidates = (part[name].to_numpy(dtype=np.float64) for name in ("score", "candidates"))
         accuracy = part["accuracy"].to_numpy()
         skill = part["skill"].to_numpy()
-        people, lots = _resampled(hits, walks, score, bootstraps, rng)
+        by_participant, lots = _resampled(hits, walks, score, bootstraps, rng)
         above = spearman_rows(score[lots], skill[lots])
         rho = spearman(score, accuracy)
         orders = np.stack([rng.permutation(accuracy) for _ in range(bootstraps)])
@@ -157,7 +157,7 @@ def correlate(
                 "predictor": predictor,
                 "places": len(part),
                 "rho": rho,
-                **_interval("people", people),
+                **_interval("people", by_participant),
                 **_interval("places", spearman_rows(score[lots], accuracy[lots])),
                 "p": float((1 + (np.abs(shuffled) >= abs(rho) - 1e-12).sum()) / (1 + bootstraps)),
                 "rho_skill": spearman(score, _skill(accuracy, candidates)),
@@ -186,14 +186,14 @@ def _resampled(
     hits: Floats, walks: Floats, score: Floats, bootstraps: int, rng: np.random.Generator
 ) -> tuple[Floats, npt.NDArray[np.intp]]:
     """``(bootstraps,)`` correlations with participants drawn anew, and ``(bootstraps, places)`` draws of places."""
-    people, number = hits.shape[1], np.empty((bootstraps, hits.shape[1]))
+    participants, number = hits.shape[1], np.empty((bootstraps, hits.shape[1]))
     lots = np.empty((bootstraps, len(score)), dtype=np.intp)
     for i in range(bootstraps):
-        number[i] = rng.multinomial(people, np.full(people, 1 / people))
+        number[i] = rng.multinomial(participants, np.full(participants, 1 / participants))
         lots[i] = rng.integers(len(score), size=len(score))
     right, count = number @ hits.T, number @ walks.T
     found = np.full(bootstraps, np.nan)
-    # A place counts only where some participant drawn has been.
+    # A place counts only if a participant that was drawn has been there.
     for seen in np.unique(count > 0, axis=0):
         rows = ((count > 0) == seen).all(axis=1)
         shares = right[np.ix_(rows, seen)] / count[np.ix_(rows, seen)]

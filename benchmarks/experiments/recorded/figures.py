@@ -69,7 +69,7 @@ def correlation_figure(correlations: pd.DataFrame, title: str, *, size: ChartSiz
     with styled(size) as own:
         chart = Chart(
             title,
-            "dot: rank correlation; thick: 95 % over people; thin: 95 % over places",
+            "dot: rank correlation; thick: 95 % over participants; thin: 95 % over places",
             f"Recorded participants. Places: {numbers}. Possible goals: all in reach, or those of use in the game.",
             description="Rank correlations with intervals.",
             size=size,
@@ -80,7 +80,9 @@ def correlation_figure(correlations: pd.DataFrame, title: str, *, size: ChartSiz
             colour = COLOURS[sets.index(row["candidate_set"])]
             thin, thick = 0.12 * own.text, 0.5 * own.text
             axes.plot([row["places_low"], row["places_high"]], [i, i], color=colour, linewidth=thin, label="places")
-            axes.plot([row["people_low"], row["people_high"]], [i, i], color=colour, linewidth=thick, label="people")
+            axes.plot(
+                [row["people_low"], row["people_high"]], [i, i], color=colour, linewidth=thick, label="participants"
+            )
             (dot,) = axes.plot(row["rho"], i, "o", color=INK, label="rho", zorder=3)
             chart.tip(dot, [f"{row['predictor']}: {row['rho']:.2f}"])
         axes.axvline(0, color=SOFT, linewidth=1, zorder=1)

@@ -14,7 +14,7 @@ __all__ = ["about_correlations"]
 
 
 def about_correlations(correlations: pd.DataFrame) -> str:
-    """Whether people are easier to predict where the score is higher.
+    """Whether participants are easier to predict where the score is higher.
 
     Args:
         correlations: As of :func:`benchmarks.experiments.recorded.analysis.correlate`, with ``level``.

@@ -1,4 +1,4 @@
-"""Scoring the stages of recorded play, and predicting the goals of the people in them."""
+"""Scoring the stages of recorded play, and predicting the goals of the participants in them."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def score_stages(trial: dict[str, Any]) -> Rows:
 
 @trial_function(TrialName("recorded/accuracy", ("benchmarks.recorded_people.run:read_stages",)))
 def evaluate_by_stage(trial: dict[str, Any]) -> Rows:
-    """How well a predictor predicts the goals of the people in a kitchen, by cross-validation.
+    """How well a predictor predicts the goals of the participants in a kitchen, by cross-validation.
 
     Returns:
         Rows ``start, goals, goal, participant, walks, correct``: how many trajectories, and how often predictions are

@@ -83,7 +83,7 @@ def _draw_spread(layout: Any, task: Any, own: pd.DataFrame, width: int) -> npt.N
     return np.asarray(image)
 
 
-# -- people at work ---------------------------------------------------------------------------------------------------
+# -- participants at work ---------------------------------------------------------------------------------------------
 
 _PANELS: Final = {
     "completion_time": "completion time, s",
@@ -96,7 +96,7 @@ _PANELS: Final = {
 
 
 def team_figure(teams: pd.DataFrame, *, size: ChartSize = "report") -> Chart:
-    """Means and 95 % intervals of measures by condition, a colour for each way the robot predicts goals.
+    """Means and 95 % intervals of measures by condition, a colour for each robot.
 
     Args:
         teams: ``reader, measure, condition, mean, low, high``.
@@ -105,9 +105,9 @@ def team_figure(teams: pd.DataFrame, *, size: ChartSize = "report") -> Chart:
     predictors = [str(name) for name in dict.fromkeys(teams["reader"])]
     with styled(size):
         chart = Chart(
-            "People and robots at work",
-            "means over people and 95 % confidence intervals",
-            "Alone: the same people without a robot; they are never idle for want of an object to take.",
+            "Participants and robots at work",
+            "means over participants and 95 % confidence intervals",
+            "Alone: the same participants without a robot; they always have an object to take, and are never idle.",
             description=f"Measures of teams by condition, {', '.join(predictors)}.",
             size=size,
             height=5.9,
@@ -154,9 +154,9 @@ def draw_all(results: tables.Results, folder: Path) -> dict[str, list[Path]]:
     paper = results.predictors[:2]
     published = bars_by_condition(
         tables.beside_published(metrics, paper),
-        {"f1, paper": "people of the paper", **{f"f1, {name}": f"{name} (ours)" for name in paper}},
-        "F1 by condition, the paper's people and ours",
-        "ours: simulated people, mean over 10 to 90 % observed",
+        {"f1, paper": "participants of the paper", **{f"f1, {name}": f"{name} (ours)" for name in paper}},
+        "F1 by condition, the paper's participants and ours",
+        "ours: simulated participants, mean over 10 to 90 % observed",
         "The paper's figures are of human participants and one layout per condition; see the text.",
     )
     traces = bars_by_condition(

@@ -1,4 +1,4 @@
-"""What the tables say: the figures behind the sentences of ``templates/experiments/tabletop``."""
+"""The figures behind the sentences of ``templates/experiments/tabletop``."""
 
 from __future__ import annotations
 
@@ -174,7 +174,7 @@ def about_compliance(table: pd.DataFrame) -> str:
 
 
 def about_teams(results: Results, teams: pd.DataFrame, differences: pd.DataFrame) -> str:
-    """What a robot that predicts goals makes of the tables."""
+    """How a robot that predicts goals works at the tables."""
     robots = list(dict.fromkeys(teams["reader"]))
     first, mean = robots[0], teams.set_index(["reader", "measure", "condition"])["mean"]
 

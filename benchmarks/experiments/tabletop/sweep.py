@@ -42,7 +42,7 @@ PUBLISHED: Final[Mapping[str, Mapping[str, float]]] = {
     "Virtual Obstacle": {"f1": 0.796, "precision": 0.803, "recall": 0.800},
     "Both": {"f1": 0.936, "precision": 0.941, "recall": 0.937},
 }
-"""Tung et al. (HRI 2024), 12 people at the table: weighted means over goals."""
+"""Tung et al. (HRI 2024), 12 participants at the table: weighted means over goals."""
 PUBLISHED_SPREAD: Final[Mapping[str, Mapping[str, float]]] = {
     "Baseline": {"determinant": 9.36e-6, "trace": 7.12e-3},
     "Placement": {"determinant": 8.50e-6, "trace": 5.90e-3},
@@ -59,16 +59,16 @@ PREDICTORS: Final = (
     PredictorSetting("logistic", "reach-logistic"),
     PredictorSetting("k-NN", "reach-knn"),
 )
-"""The paper's two first. Its Gaussian is indexed by the share of the whole duration, which is unknown while a reach is
-going on; the one called just so aligns what was seen so far."""
+"""The paper's two first. Its Gaussian is indexed by the share of the whole duration, which is unknown during a
+reach; the one named plainly "Gaussian" aligns what was seen so far."""
 NEURAL: Final = PredictorSetting(
     "GRU", "recurrent", {"members": 2, "max_epochs": 40, "patience": 6, "device": "cpu"}, max_repeats=1
 )
 
 ALONE: Final = "alone"
-"""What tables call work without a robot."""
+"""Name, in tables, of work without a robot."""
 NO_PREDICTION: Final = "no prediction"
-"""What tables call a robot that holds all goals for equally likely."""
+"""Name, in tables, of a robot that holds all goals for equally likely."""
 
 
 @dataclass(frozen=True)

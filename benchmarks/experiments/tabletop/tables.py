@@ -91,7 +91,7 @@ def load_results(folder: Path) -> Results:
     """
     names = ("layouts", "readings", "curves", "spreads", "teams")
     layouts, readings, curves, spreads, teams = (logged_rows(folder, name, "tabletop") for name in names)
-    # What a robot without prediction was called in results of before.
+    # Earlier results call a robot without prediction so.
     teams = teams.replace({"reader": {"reads nothing": NO_PREDICTION}})
     return Results(layouts, by_table(readings), curves, spreads, teams)
 
@@ -157,7 +157,7 @@ def compliance_table(results: Results) -> pd.DataFrame:
 
 
 def hypotheses_of(results: Results) -> dict[str, Hypotheses]:
-    """H1 to H3 for each way to design tables, against the sorted one; for Both also against either alone."""
+    """H1 to H3 for each design of tables, against the sorted one; for Both also against either alone."""
     rows, curves = accuracy_rows(results), results.curves
     return {
         treatment: assess_hypotheses(

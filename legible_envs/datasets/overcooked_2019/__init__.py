@@ -1,10 +1,10 @@
 """Real recorded play: Overcooked-AI's published 2019 human-human games, fetched, converted and cut into trajectories.
 
-    >>> fetch_recordings()                                            # doctest: +SKIP
-    >>> trajectories = recorded_trajectories(layouts=["cramped_room"])       # doctest: +SKIP
+    >>> fetch_recordings()  # doctest: +SKIP
+    >>> trajectories = recorded_trajectories(layouts=["cramped_room"])  # doctest: +SKIP
 
-91,102 ticks of 76 games that 17 pairs of people played in five kitchens (Carroll et al., *On the Utility of Learning
-about Humans for Human-AI Coordination*, NeurIPS 2019).
+91,102 ticks of 76 games that 17 pairs of participants played in five kitchens (Carroll et al., *On the Utility of
+Learning about Humans for Human-AI Coordination*, NeurIPS 2019).
 """
 
 from __future__ import annotations
@@ -127,7 +127,7 @@ def recorded_layouts(folder: str | os.PathLike[str] | None = None) -> dict[str, 
     ``random0`` and ``random3`` are called forced coordination and counter circuit in the paper.
 
     Raises:
-        RecordingsError: See :func:`load_recorded_games`.
+        RecordingsError: The games are not there, or damaged; the message says how to get them.
     """
     return {game.layout_name: game.layout for game in load_recorded_games(folder)}
 
@@ -141,7 +141,7 @@ def recorded_trajectories(
     min_candidates: int = 2,
     round_trips: bool = False,
 ) -> list[Trajectory]:
-    """Trajectories of recorded people: empty-handed from a pot or serving station to an onion or dish station.
+    """Trajectories of recorded participants: empty-handed from a pot or serving station to an onion or dish station.
 
     With the defaults there are 502, 807, 424 and 673 of them in ``asymmetric_advantages``, ``coordination_ring``,
     ``cramped_room`` and ``random3``, and none in ``random0``, where pots and dispensers are in different rooms.
@@ -158,7 +158,7 @@ def recorded_trajectories(
             the player did not have to move.
 
     Raises:
-        RecordingsError: See :func:`load_recorded_games`.
+        RecordingsError: The games are not there, or damaged; the message says how to get them.
     """
     from legible_envs.datasets.overcooked_2019.trajectories import trajectories_of_games
 
@@ -180,7 +180,7 @@ def recording_stats(folder: str | os.PathLike[str] | None = None) -> list[dict[s
         every length) and ``scored_trajectories`` (with its defaults). The last row is ``"all"``.
 
     Raises:
-        RecordingsError: See :func:`load_recorded_games`.
+        RecordingsError: The games are not there, or damaged; the message says how to get them.
     """
     from legible_envs.datasets.overcooked_2019.trajectories import statistics
 

@@ -196,7 +196,7 @@ def _session(settings: PipSettings) -> Any:
 
 
 def _find_links(settings: PipSettings, session: Any) -> tuple[list[Any], list[str]]:
-    """Links to the file, those whose index vouches for the hash first, and what went wrong on the way."""
+    """Links to the file, those whose index vouches for the hash first, and what went wrong meanwhile."""
     from unearth import Link, PackageFinder
 
     links: list[Any] = []

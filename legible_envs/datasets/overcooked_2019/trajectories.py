@@ -48,7 +48,7 @@ def trajectories_of_games(
 
 
 def _valid_goals(game: RecordedGame) -> Callable[[int, int], Collection[str]]:
-    """What empty hands may usefully fetch in the 2019 game: ``legible_envs.overcooked.game.goals`` says the same."""
+    """Goals of use to empty hands in the 2019 game: the rule of ``legible_envs.overcooked.game.goals``."""
     full = game.pots[:, :, :4].sum(axis=2) >= _FULL
 
     def valid(tick: int, player: int) -> Collection[str]:

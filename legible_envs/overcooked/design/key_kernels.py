@@ -41,7 +41,7 @@ def place_by_keys(
 
     Args:
         keys: ``[N + I]`` keys; the first ``N`` are used.
-        geometry: Where things may stand.
+        geometry: Where stations and obstacles may stand.
         order: ``[N]`` the order in which stations are placed.
         choices: ``[N, M]`` scratch.
         slots: ``[N]`` output: the slot of each station.

@@ -1,4 +1,4 @@
-"""What a kitchen genome can express: slots on the border, obstacles inside, and the rules that make a design valid."""
+"""Layouts that a kitchen genome can express (slots on the border, obstacles inside), and the rules of valid designs."""
 
 from __future__ import annotations
 

@@ -76,7 +76,7 @@ class OvercookedWorkspace(Workspace):
         task: The :class:`~legible_envs.tasks.TaskGraph`.
         scorer: The :class:`~legible_envs.overcooked.scoring.scorer.OvercookedScorer` of single layouts.
         rules: The :class:`~legible_envs.overcooked.design.rules.DesignRules`.
-        human: Name of the model of people; ``rationality`` and ``horizon`` are its settings.
+        human: Name of the model of how people move; ``rationality`` and ``horizon`` are its settings.
 
     Raises:
         LayoutError: Shape, stations, locked or forbidden cells, or ``start_from`` break a rule.

@@ -10,7 +10,7 @@ soups on the fire, in hands or on counters are taken): two pots never commit to 
 holds a whole recipe. With ``put_back`` no state is a dead end for a single player: hands can always be emptied where
 they were filled, accepted ingredients and soups are always of use, and soups on counters can be picked up again.
 What remains: several players can block each other for ever, or, in a kitchen divided by counters, fill all
-counters over which they hand things to each other with things that only the other side could use up.
+counters over which they hand objects to each other with objects that only the other side could use up.
 """
 
 from __future__ import annotations

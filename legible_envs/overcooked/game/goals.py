@@ -1,4 +1,4 @@
-"""What a player may do and reach for next: kernels on the vectors described in ``vectors``.
+"""The actions a player may take and the goals they may reach for next: kernels on the vectors described in ``vectors``.
 
 The goals here are those of the running game (the candidate set ``game``): stations and counters where an INTERACT would
 bring the game forward, as far as the player can get to them. With one pot they are the goals of

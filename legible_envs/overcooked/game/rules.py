@@ -22,7 +22,7 @@ MAX_COPIES: Final = 15
 
 @dataclass(frozen=True, slots=True)
 class GameRules:
-    """What the game does, apart from the kitchen it is played in.
+    """The rules of the game, independent of the kitchen.
 
     Attributes:
         recipes: The soups, in the order of the observation's order channels; :data:`PAPER_SOUPS` by default.

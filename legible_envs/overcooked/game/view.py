@@ -1,4 +1,4 @@
-"""A snapshot of a running game in words, for drawing and for people: what the arrays of the dynamics mean."""
+"""A snapshot of a running game in words, for drawing and for users: the meaning of the arrays of the dynamics."""
 
 from __future__ import annotations
 

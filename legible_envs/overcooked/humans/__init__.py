@@ -1,4 +1,4 @@
-"""Simulated people in kitchens: how they walk, whole participants, and their fit to recorded play."""
+"""Simulated participants in kitchens: how they walk, whole tasks, and their fit to recorded play."""
 
 import lazy_loader as lazy
 

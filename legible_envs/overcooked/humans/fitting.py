@@ -1,4 +1,4 @@
-"""How rational people walk: the local softmax walker, fitted to trajectories by maximum likelihood."""
+"""How rationally people walk: the local softmax walker, fitted to trajectories by maximum likelihood."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ class RationalityFit:
     """Maximum likelihood estimate of the rationality of a local softmax walker.
 
     Attributes:
-        rationality: Per unit of path cost; 0 where people walk no better than at random, ``inf`` where every step was a
-            best one.
+        rationality: Per unit of path cost; 0 where steps were no better than random ones, ``inf`` where every step
+            was a best one.
         interval: Profile likelihood interval: all values that a likelihood ratio test does not reject. It takes steps
             as independent.
         standard_error: From the observed information, steps independent; NaN at 0 and ``inf``.
@@ -54,11 +54,11 @@ class RationalityFit:
 
 @dataclass(frozen=True)
 class RationalitySpread:
-    """How much people differ in rationality.
+    """How much participants differ in rationality.
 
     Attributes:
-        median: Median person, ``exp(mean of log rationality)``.
-        sd: Standard deviation of log rationality between people, the error of each estimate taken out.
+        median: Median participant, ``exp(mean of log rationality)``.
+        sd: Standard deviation of log rationality between participants, the error of each estimate taken out.
         raw_sd: The same with these errors left in.
         fits: Fit of each participant.
     """
@@ -99,8 +99,8 @@ def fit_rationality(
 ) -> RationalityFit:
     r"""Fit the rationality of :class:`~legible_envs.overcooked.humans.BoltzmannWalker`.
 
-    Every step counts, from floor cell to floor cell and into the goal station; where people stand first, and how long,
-    does not. The log-likelihood is concave, so the estimate is the only one.
+    Every step counts, from floor cell to floor cell and into the goal station; where participants stand first, and how
+    long, does not. The log-likelihood is concave, so the estimate is the only one.
 
     Args:
         trajectories: With a layout and a goal, consecutive repeats dropped.
@@ -115,16 +115,16 @@ def fit_rationality(
         >>> from legible_envs.overcooked import OvercookedLayout
         >>> kitchen = OvercookedLayout.from_ascii("XOXXX\nX   X\nXXXSX")
         >>> there_and_back = [(1, 3), (1, 2), (1, 3), (1, 2), (1, 1), (0, 1)]
-        >>> walk = Trajectory(there_and_back, goal="onion", candidates=("onion",), layout=kitchen)
-        >>> round(fit_rationality([walk]).rationality, 3)
+        >>> trajectory = Trajectory(there_and_back, goal="onion", candidates=("onion",), layout=kitchen)
+        >>> round(fit_rationality([trajectory]).rationality, 3)
         0.347
     """
-    walks = list(trajectories)
+    listed = list(trajectories)
     if not 0 < confidence < 1:
         raise ValueError(f"`confidence` must be in (0, 1), got {confidence!r}")
-    names = sorted({walk.participant for walk in walks})
-    steps = _collect(walks, names, cell_costs)
-    return _fit(steps, confidence, len(walks), len(names))
+    names = sorted({trajectory.participant for trajectory in listed})
+    steps = _collect(listed, names, cell_costs)
+    return _fit(steps, confidence, len(listed), len(names))
 
 
 def rationality_spread(
@@ -141,12 +141,12 @@ def rationality_spread(
         ValueError: Fewer than two participants with enough trajectories and an estimate that is neither 0 nor infinite.
     """
     by_name: dict[str, list[Trajectory]] = {}
-    for walk in trajectories:
-        by_name.setdefault(walk.participant, []).append(walk)
+    for trajectory in trajectories:
+        by_name.setdefault(trajectory.participant, []).append(trajectory)
     fits = {
-        name: fit_rationality(walks, confidence=confidence)
-        for name, walks in sorted(by_name.items())
-        if len(walks) >= min_trajectories
+        name: fit_rationality(own, confidence=confidence)
+        for name, own in sorted(by_name.items())
+        if len(own) >= min_trajectories
     }
     usable = [fit for fit in fits.values() if 0 < fit.rationality < math.inf]
     if len(usable) < 2:
@@ -160,32 +160,32 @@ def rationality_spread(
     return RationalitySpread(float(np.exp(logs.mean())), math.sqrt(between), math.sqrt(variance), fits)
 
 
-def _collect(walks: Sequence[Trajectory], names: Sequence[str], cell_costs: npt.ArrayLike | None) -> _Steps:
+def _collect(trajectories: Sequence[Trajectory], names: Sequence[str], cell_costs: npt.ArrayLike | None) -> _Steps:
     fields: dict[tuple[object, str], GoalField] = {}
     excess, taken, who = [], [], []
-    for number, walk in enumerate(walks):
-        if not isinstance(walk.layout, OvercookedLayout) or walk.goal is None or not walk.is_grid:
+    for number, trajectory in enumerate(trajectories):
+        if not isinstance(trajectory.layout, OvercookedLayout) or trajectory.goal is None or not trajectory.is_grid:
             raise ValueError(f"trajectory {number} has no kitchen, no goal, or positions instead of cells")
-        key = walk.layout, walk.goal
+        key = trajectory.layout, trajectory.goal
         if key not in fields:
-            fields[key] = goal_field(walk.layout, walk.layout.stations[walk.goal], cell_costs)
+            fields[key] = goal_field(trajectory.layout, trajectory.layout.stations[trajectory.goal], cell_costs)
         field = fields[key]
-        cells = [int(row) * field.width + int(col) for row, col in walk.states.tolist()]
+        cells = [int(row) * field.width + int(col) for row, col in trajectory.states.tolist()]
         for i, (before, after) in enumerate(itertools.pairwise(cells)):
             options = [neighbour(before, direction, field.height, field.width) for direction in range(4)]
             if not field.floor[before] or after not in options or not is_option(after, field):
                 (a, b), (c, d) = divmod(before, field.width), divmod(after, field.width)
                 raise ValueError(
                     f"trajectory {number}: the step after state {i}, from row {a}, column {b} to row {c}, column {d}, "
-                    f"is not to a neighbouring floor cell or into {walk.goal!r}"
+                    f"is not to a neighbouring floor cell or into {trajectory.goal!r}"
                 )
             costs = np.array([_cost(option, field) for option in options])
             excess.append(costs - costs.min())
             taken.append(_cost(after, field) - costs.min())
-            who.append(names.index(walk.participant))
+            who.append(names.index(trajectory.participant))
     table = np.array(excess).reshape(-1, 4)
     if not len(table) or not (np.isfinite(table).sum(axis=1) > 1).any():
-        raise ValueError(f"{len(walks)} trajectories have no step at which there was a choice")
+        raise ValueError(f"{len(trajectories)} trajectories have no step at which there was a choice")
     return _Steps(table, np.array(taken), np.array(who, dtype=np.intp))
 
 

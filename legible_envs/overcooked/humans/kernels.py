@@ -172,10 +172,10 @@ def choose_step(
 def sample_walk(
     kind: int, params: Floats, start: int, field: GoalField, rng: np.random.Generator, path: npt.NDArray[np.int64]
 ) -> int:
-    """Write a walk to ``path [longest]``: the floor cells from ``start`` on, then the goal's cell.
+    """Write a person's cells to ``path [longest]``: the floor cells from ``start`` on, then the goal's cell.
 
     Returns:
-        Number of cells written; 0 where the walk did not end in time.
+        Number of cells written; 0 where the person did not find the goal in time.
     """
     memory, weights = np.zeros(len(field.floor)), np.empty(4)
     cell, heading = start, -1
@@ -292,7 +292,7 @@ def sample_times(
 def step_probabilities(
     path: npt.NDArray[np.int64], field: GoalField, params: Floats, planned: Floats, slipped: Floats
 ) -> None:
-    """Write the probability of each step of a walk, given where it began.
+    """Write the probability of each step of a trajectory, given where it began.
 
     A planner who slips with probability ``s`` takes the step with ``(1 - s) * planned + s * slipped``.
 

@@ -1,4 +1,4 @@
-"""People fitted to recorded play: the noisily rational walker, and the planner."""
+"""Walkers fitted to the participants of recorded play: the noisily rational one, and the planner."""
 
 from __future__ import annotations
 
@@ -42,10 +42,10 @@ class PlannerFit:
 
     Attributes:
         depth: Steps looked ahead, the best of ``GRID``, as all but the slips.
-        turn_cost: Of all people together.
-        recency: Of all people together.
-        fade: Of all people together.
-        slip: Of all people together.
+        turn_cost: Of all participants together.
+        recency: Of all participants together.
+        fade: Of all participants together.
+        slip: Of all participants together.
         log_likelihood: Of all steps, at these.
         num_steps: Steps taken.
         people: ``{participant: (turn_cost, slip)}``, the rest as for all.
@@ -61,16 +61,16 @@ class PlannerFit:
     people: dict[str, tuple[float, float]]
 
 
-def fit_boltzmann(walks: Sequence[Trajectory]) -> list[dict[str, Any]]:
-    """The rationality of recorded people.
+def fit_boltzmann(trajectories: Sequence[Trajectory]) -> list[dict[str, Any]]:
+    """The rationality of recorded participants.
 
     Returns:
-        A row for all of them (``median``, ``spread`` between people on the log scale with the error of each estimate
-        taken out, and the ``log_likelihood`` of all steps at one common rationality), with empty ``participant``; then
-        one for each person with ``rationality``.
+        A row for all of them (``median``, ``spread`` between participants on the log scale with the error of each
+        estimate taken out, and the ``log_likelihood`` of all steps at one common rationality), with empty
+        ``participant``; then one for each participant with ``rationality``.
     """
-    spread = rationality_spread(walks, min_trajectories=MIN_TRAJECTORIES)
-    common = fit_rationality(walks)
+    spread = rationality_spread(trajectories, min_trajectories=MIN_TRAJECTORIES)
+    common = fit_rationality(trajectories)
     whole = {
         "walker": "boltzmann",
         "participant": "",
@@ -88,17 +88,17 @@ def fit_boltzmann(walks: Sequence[Trajectory]) -> list[dict[str, Any]]:
     return [whole, *each]
 
 
-def fit_planner(walks: Sequence[Trajectory], grid: Mapping[str, Sequence[float]] = GRID) -> PlannerFit:
+def fit_planner(trajectories: Sequence[Trajectory], grid: Mapping[str, Sequence[float]] = GRID) -> PlannerFit:
     """Fit the planner to recorded trajectories.
 
     All parameters are fitted for all participants together, one after the other over a grid until none is better
     changed alone (the rate of slips exactly, for each); then each participant's own cost of turning and rate of slips.
 
     Args:
-        walks: Trajectories with a kitchen, a goal and a participant.
+        trajectories: Trajectories with a kitchen, a goal and a participant.
         grid: Values tried.
     """
-    recorded = _prepared(walks)
+    recorded = _prepared(trajectories)
     who = np.repeat([name for *_, name in recorded], [len(path) - 1 for path, *_ in recorded])
     seen: dict[tuple[float, ...], tuple[Floats, Floats]] = {}
 
@@ -120,7 +120,7 @@ def fit_planner(walks: Sequence[Trajectory], grid: Mapping[str, Sequence[float]]
                     best, (slip, value), moved = {**best, name: other}, found, True
     turning = [(turn, *steps({**best, "turn_cost": turn})) for turn in grid["turn_cost"]]
     people = {}
-    for name, number in Counter(walk.participant for walk in walks).items():
+    for name, number in Counter(trajectory.participant for trajectory in trajectories).items():
         if number >= MIN_TRAJECTORIES:
             own = [(turn, *best_slip(planned[who == name], slipped[who == name])) for turn, planned, slipped in turning]
             turn, own_slip, _ = max(own, key=lambda fit: fit[2])
@@ -146,25 +146,25 @@ def best_slip(planned: Floats, slipped: Floats) -> tuple[float, float]:
     return float(found.x), -float(found.fun)
 
 
-def _prepared(walks: Sequence[Trajectory]) -> Recorded:
+def _prepared(trajectories: Sequence[Trajectory]) -> Recorded:
     """Paths as cell numbers, the costs to go to each goal, and the participant."""
     from legible_envs.overcooked.layout import OvercookedLayout
 
     fields: dict[tuple[object, str], GoalField] = {}
     found: Recorded = []
-    for walk in walks:
-        if not isinstance(walk.layout, OvercookedLayout) or walk.goal is None:
-            raise ValueError("trajectories to fit people on need a kitchen and a goal")
-        key = walk.layout, walk.goal
+    for trajectory in trajectories:
+        if not isinstance(trajectory.layout, OvercookedLayout) or trajectory.goal is None:
+            raise ValueError("trajectories to fit participants on need a kitchen and a goal")
+        key = trajectory.layout, trajectory.goal
         if key not in fields:
-            fields[key] = goal_field(walk.layout, walk.layout.stations[walk.goal])
-        path = walk.states[:, 0].astype(np.int64) * walk.layout.shape[1] + walk.states[:, 1]
-        found.append((path.astype(np.int64), fields[key], walk.participant))
+            fields[key] = goal_field(trajectory.layout, trajectory.layout.stations[trajectory.goal])
+        path = trajectory.states[:, 0].astype(np.int64) * trajectory.layout.shape[1] + trajectory.states[:, 1]
+        found.append((path.astype(np.int64), fields[key], trajectory.participant))
     return found
 
 
 def _step_probabilities(recorded: Recorded, params: Floats) -> tuple[Floats, Floats]:
-    """``(m,)`` each of all steps of all walks, as :func:`step_probabilities` gives them."""
+    """``(m,)`` each of all steps of all trajectories, as :func:`step_probabilities` gives them."""
     from legible_envs.overcooked.humans.kernels import step_probabilities
 
     ends = np.cumsum([0, *(len(path) - 1 for path, *_ in recorded)])
@@ -175,12 +175,12 @@ def _step_probabilities(recorded: Recorded, params: Floats) -> tuple[Floats, Flo
 
 
 def draw_person(people: Mapping[str, Any]) -> Callable[..., Walker]:
-    """What draws a person for :func:`~legible_envs.overcooked.humans.simulate_participants`.
+    """A function that draws participants for :func:`~legible_envs.overcooked.humans.simulate_participants`.
 
     Args:
         people: Plain data: ``walker`` and its parameters, as :func:`benchmarks.experiments.overcooked.sweep.people_of`
-            makes them. Boltzmann people have lognormal rationality; planners the cost of turning and the slips of one
-            recorded person each, drawn at random.
+            makes them. Boltzmann walkers have lognormal rationality; planners the cost of turning and the slips of one
+            recorded participant each, drawn at random.
     """
     kind, preference = people["walker"], float(people["preference"])
     if kind == "boltzmann":
@@ -198,5 +198,5 @@ def draw_person(people: Mapping[str, Any]) -> Callable[..., Walker]:
             return PlannerWalker.draw(shape, rng, preference=preference, turn_cost=turn_cost, slip=slip, **shared)
 
     else:
-        raise ValueError(f"people are 'boltzmann' or 'planner', got {kind!r}")
+        raise ValueError(f"`walker` must be 'boltzmann' or 'planner', got {kind!r}")
     return draw

@@ -2,13 +2,13 @@
 
 :class:`BoltzmannWalker` is the noisily rational walker that ``human="boltzmann"`` scores and
 :func:`fit_rationality` fits to recorded play. :class:`PlannerWalker` errs for other reasons: it sees only a few steps
-ahead, dislikes turning, and avoids where it has just been. A layout, or a predictor, that was made with one model of
-people should be evaluated with the other, too.
+ahead, dislikes turning, and avoids where it has just been. A layout, or a predictor, that was made with one model
+should be evaluated with the other, too.
 
 Both walk from station to station: floor cells, then the goal station. Time passes in ticks. Before each step a person
 stands idle or looks around for a while (each tick with probability ``idle`` and ``turn``); a step takes a tick and
-turns the person, using the goal takes one, and one more where the person does not face it. In recorded play a walk's
-ticks are moves (23 %), turns on the spot (6 %), idle (63 %) and uses of stations.
+turns the person, using the goal takes one, and one more where the person does not face it. In recorded play the
+ticks of a trajectory are moves (23 %), turns on the spot (6 %), idle (63 %) and uses of stations.
 """
 
 from __future__ import annotations
@@ -55,9 +55,9 @@ class BoltzmannWalker(Walker):
 
     From floor cell ``a``, the next step leads to ``b`` with probability
     ``P(b | a, G) ∝ exp(-rationality * (cost(b) + C*(b -> G)))``, where ``b`` is a free neighbouring cell (back, too)
-    or, where it is beside ``a``, the goal station with ``cost = 1`` and ``C* = 0``. Standing still is no step: time is
-    another matter (see :class:`Walker`). With ``preferences`` costs are this person's own; an observer who does not
-    know them sees a person of unusual habits.
+    or, where it is beside ``a``, the goal station with ``cost = 1`` and ``C* = 0``. Standing still is no step; ``idle``
+    and ``turn`` say how time passes. With ``preferences`` costs are this person's own; to an observer who does not know
+    them, this person has unusual habits.
 
     Args:
         rationality: Per unit of cost; 0 walks at random. 1.1 to 1.7 in recorded play.
@@ -101,10 +101,10 @@ class BoltzmannWalker(Walker):
             shape: Of the kitchens the person has preferences in.
             rng: Source of randomness.
             rationality: Of the median person.
-            spread: Standard deviation of log rationality between people. :func:`rationality_spread` finds .13, .22,
-                .40 and .25 in the four recorded kitchens.
-            preference: Standard deviation of the log cost of each cell; 0 for people without preferences.
-            **arguments: See :class:`Walker`.
+            spread: Standard deviation of log rationality between participants. :func:`rationality_spread` finds .13,
+                .22, .40 and .25 in the four recorded kitchens.
+            preference: Standard deviation of the log cost of each cell; 0 for a person without preferences.
+            **arguments: Of every :class:`Walker`: ``idle``, ``turn``, ``tick``.
         """
         own = check_finite("rationality", rationality, 0.0) * math.exp(
             check_finite("spread", spread, 0.0) * rng.normal()
@@ -117,16 +117,17 @@ class PlannerWalker(Walker):
 
     At each step all paths of ``depth`` steps are compared (shorter ones that end in the goal, too) by the cost of their
     cells, ``turn_cost`` for every change of direction, ``recency`` times the memory of every cell on them, and the
-    beeline (Manhattan distance) from their end to the goal: what lies behind the next corner is not known. The first
-    step of a best path is taken, ties broken at random; with probability ``slip`` any step. The memory of a cell grows
-    by 1 with each visit and fades by ``fade`` with each step. In a kitchen with dead ends such people walk into them.
+    beeline (Manhattan distance) from their end to the goal: the person does not know what lies behind the next corner.
+    They take the first step of a best path, ties broken at random; with probability ``slip`` any step. The memory of a
+    cell grows by 1 with each visit and fades by ``fade`` with each step. In a kitchen with dead ends this person walks
+    into them.
 
     Args:
         depth: Steps looked ahead, 1 to 6.
         turn_cost: Cost of a change of direction.
         recency: Cost of a cell that was just visited.
         fade: What is left of a memory after a step, in [0, 1).
-        slip: Probability of a random step, in [0, 1]. With 0, people may circle for ever in kitchens with dead ends.
+        slip: Probability of a random step, in [0, 1]. With 0, they may circle for ever in kitchens with dead ends.
         **arguments: Of every :class:`Walker`: ``preferences``, ``idle``, ``turn``, ``tick``.
     """
 
@@ -170,7 +171,7 @@ class PlannerWalker(Walker):
             shape: Of the kitchens the person has preferences in.
             rng: Source of randomness.
             preference: Standard deviation of the log cost of each cell.
-            **arguments: What not to draw; see the class.
+            **arguments: Given instead of drawn: arguments of the class.
         """
         drawn = {
             "depth": int(rng.integers(2, 5)),
@@ -199,10 +200,10 @@ def simulate_participants(
 ) -> list[Trajectory]:
     """Trajectories of simulated participants who each do a whole task, in a uniformly random valid sequence.
 
-    Where the task is at a stage (start, valid goals), the person walks from the cell it stands on to the goal of the
+    At each stage of the task (start, valid goals) the person walks from the cell they stand on to the goal of the
     sequence: that is a trajectory, with the valid goals as candidates (candidate set ``task``). The legs that follow,
-    such as back to the pot, are walked and take their time, but give nothing to predict and no trajectory; cooking is
-    not waited for. Where a type of station repeats, each one in reach is a goal, equally likely; other stops are the
+    such as back to the pot, take their time, but leave nothing to predict and give no trajectory; nothing waits for
+    the cooking. Where a type of station repeats, each one in reach is a goal, equally likely; other stops are the
     nearest of their type.
 
     Args:
@@ -210,7 +211,7 @@ def simulate_participants(
         n: Number of participants.
         rng: Source of all randomness.
         task: The task over station types; the paper's three soups if None.
-        population: What participants are drawn from, each anew: ``"boltzmann"`` (also None) or ``"planner"``, or a
+        population: Each participant is drawn anew from it: ``"boltzmann"`` (also None) or ``"planner"``, or a
             callable that makes one participant's walker, called with (shape, rng).
         executions: How often each participant does the task.
         participant: Names are ``"{participant}/0"``, ``"{participant}/1"``, ….
@@ -234,8 +235,8 @@ def simulate_participants(
         labels = {"participant": f"{participant}/{number}", "condition": condition, "layout_name": layout_name}
         clock = 0
         for _ in range(executions):
-            walks, clock = _execute(layout, task, person, clock, rng, labels)
-            found += walks
+            done, clock = _execute(layout, task, person, clock, rng, labels)
+            found += done
     return found
 
 

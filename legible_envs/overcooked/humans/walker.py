@@ -1,4 +1,4 @@
-"""Simulated participants who walk in kitchens: all that does not depend on how they decide their steps."""
+"""Simulated participants in kitchens: everything but how they decide their steps."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Walker(ABC):
     Args:
         preferences: ``(H, W)`` cost of stepping on each cell (> 0), for kitchens of that shape; None means 1 each.
         idle: Probability of each tick to be spent standing; about half in recorded play.
-        turn: Probability of each tick to be spent turning to something that cannot be walked on.
+        turn: Probability of each tick to be spent turning to a cell that is no floor.
         tick: Seconds per tick.
 
     Raises:
@@ -113,11 +113,12 @@ class Walker(ABC):
             goals: The goal, or goals of which one is drawn for each trajectory.
             n: How many trajectories.
             rng: Source of randomness.
-            candidates: What an observer takes for possible; the goals if None.
+            candidates: Goals that an observer takes for possible; ``goals`` if None.
             **labels: Further attributes of :class:`~legible_envs.rollouts.Trajectory`, such as ``participant``.
 
         Raises:
-            LayoutError: See :meth:`walk`.
+            LayoutError: No such station, or no path from the start to a goal.
+            RuntimeError: The person did not find the goal in 100,000 steps.
         """
         names = (goals,) if isinstance(goals, str) else tuple(goals)
         labels = {"condition": "simulated", **labels}
@@ -156,7 +157,7 @@ class Walker(ABC):
             raise LayoutError(f"row {start[0]}, column {start[1]} is no floor cell", rule="start", cell=cells[0])
         field = self._field(layout, goal)
         near = [cell for cell in cells if field.cost_to_go[cell[0] * field.width + cell[1]] < np.inf]
-        return draw_one(near, f"no way to {goal!r} from {start!r}", rng)
+        return draw_one(near, f"no path to {goal!r} from {start!r}", rng)
 
     def _make_field(self, layout: OvercookedLayout, goal: str) -> GoalField:
         return goal_field(layout, layout.stations[goal], self.costs(layout.shape))
@@ -196,7 +197,7 @@ class Walker(ABC):
 def draw_one(cells: Sequence[Cell], what: str, rng: np.random.Generator) -> Cell:
     """One of the cells, each equally likely; a :class:`LayoutError` about ``what`` where there is none."""
     if not cells:
-        raise LayoutError(f"{what}: nobody can walk there", rule="reachable")
+        raise LayoutError(f"{what}: no person can walk there", rule="reachable")
     return cells[int(rng.integers(len(cells)))]
 
 
@@ -207,7 +208,7 @@ def _shortest_field(layout: OvercookedLayout, name: str) -> GoalField:
 
 
 def in_reach(layout: OvercookedLayout, cell: Cell, kind: str) -> list[str]:
-    """Stations of one type that can be walked to, the nearest first."""
+    """Stations of one type that a person can reach, the nearest first."""
     at = cell[0] * layout.shape[1] + cell[1]
     steps = {name: float(_shortest_field(layout, name).cost_to_go[at]) for name in layout.named(kind)}
     found = sorted((name for name in steps if steps[name] < np.inf), key=lambda name: steps[name])

@@ -1,4 +1,4 @@
-"""What moves and changes: chefs, and pots with what is in them."""
+"""Objects that move and change: chefs, and pots with their contents."""
 
 from __future__ import annotations
 

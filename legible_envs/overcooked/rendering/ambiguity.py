@@ -39,7 +39,7 @@ def draw_ambiguity(
         layout: Any kitchen.
         heat: ``(H, W)`` values in [0, 1]; NaN leaves a cell as it is.
         tile: Pixels of a cell's side, 8 to 256.
-        paths: Ways to draw on top, each the ``(row, col)`` cells it visits; as a mapping, with a name each.
+        paths: Paths to draw on top, each the ``(row, col)`` cells it visits; as a mapping, with a name each.
         values: Whether to write the values (in hundredths) on the cells.
         legend: What 0 and what 1 mean.
         title: A line above the drawing.

@@ -103,7 +103,7 @@ def draw_ingredient(canvas: Canvas, kind: str, x: float, y: float, radius: float
 
 
 def soup_colour(contents: Sequence[str]) -> str:
-    """What a soup of these ingredients looks like: their colours blended, on the warm side."""
+    """The colour of a soup of these ingredients: their colours blended, on the warm side."""
     colour = PALETTE[contents[0]]
     for number, kind in enumerate(contents[1:], 2):
         colour = mix(colour, PALETTE[kind], 1 / number)

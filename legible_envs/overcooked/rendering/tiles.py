@@ -14,7 +14,7 @@ from legible_envs.overcooked.rendering.palette import PALETTE
 __all__ = ["COUNTER_TOP", "tile_sprite"]
 
 COUNTER_TOP: Final = 0.42
-"""Height at which things stand on a counter, in tiles from the top of its cell."""
+"""Height at which objects stand on a counter, in tiles from the top of its cell."""
 
 _FRONT: Final = 0.18  # how much of a counter's cell shows its front
 

@@ -1,4 +1,4 @@
-"""The score of noisily rational people, ``human="boltzmann"``: the readable definition, and the models of people.
+"""The score of noisily rational people, ``human="boltzmann"``: the readable definition, and models of motion.
 
 At every node of its trajectory a *Boltzmann walker* draws the next step from a local softmax,
 

@@ -1,6 +1,6 @@
 """Kernels of the exact legibility score of kitchens whose stations each have one access cell.
 
-What is computed is defined in :mod:`legible_envs.legibility`; here it is arranged to be fast. Grids are flat arrays
+:mod:`legible_envs.legibility` defines the score; here the computation is arranged to be fast. Grids are flat arrays
 with their counter border, so that a neighbour is an offset. One flood per station gives distances and the number of
 shortest paths to every cell. A cell on a shortest path then knows the *excess cost* of every goal (how much longer the
 path through the cell is than the shortest), and one sum over the subsets of goals that are not tied serves all stages
@@ -23,7 +23,7 @@ BLOCKED = -2
 
 
 class ScoreTables(NamedTuple):
-    """What the score needs to know of task and parameters; ``S`` starts, ``K`` goals, ``N`` stations.
+    """Task and parameters as the score needs them; ``S`` starts, ``K`` goals, ``N`` stations.
 
     Attributes:
         starts: ``[S]`` station index of each place where a person may stand when choosing the next goal.

@@ -113,7 +113,7 @@ def _instances(layout: OvercookedLayout, kind: str) -> tuple[str, ...]:
 
 
 def human_model(layout: OvercookedLayout, human: HumanModel | HumanName) -> HumanModel:
-    """The model of people of that name, with a horizon that suits one kitchen.
+    """The model of motion of that name, with a horizon that suits one kitchen.
 
     Raises:
         ValueError: An unknown name, or a horizon too short for this kitchen.

@@ -1,4 +1,4 @@
-"""The score of kitchens: one task, one observer and one model of people, for any layout."""
+"""The score of kitchens: one task, one observer and one model of human motion, for any layout."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class OvercookedScorer:
     Attributes:
         task: The task.
         observer: The observer.
-        human: The model of people.
+        human: The model of human motion.
         cell_costs: The costs, or None.
 
     Raises:

@@ -1,4 +1,4 @@
-"""What an archive of tables is laid out by: how near objects lie to one another, and their order from left to right."""
+"""Measures of an archive of tables: how near objects lie to one another, and their order from left to right."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a genome of a table can express, and the rules that make a design valid, each with its message."""
+"""Layouts that a genome of a table can express, and the rules that make a design valid, each with its message."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Simulated people at a table: how they reach, whole participants, and their fit to recorded reaches."""
+"""Simulated participants at a table: how they reach, whole tasks, and their fit to recorded reaches."""
 
 import lazy_loader as lazy
 

@@ -77,7 +77,7 @@ class _Bows(NamedTuple):
 
 
 class _Durations(NamedTuple):
-    """The median person with durations by Fitts' law and corners, and how durations spread between people."""
+    """The median person with durations by Fitts' law and corners, and how durations spread between participants."""
 
     median: Person
     spread: float
@@ -86,13 +86,13 @@ class _Durations(NamedTuple):
 def fit_reaches(
     trajectories: Iterable[Trajectory], *, base: ReachModel | None = None, width: float = CUBE
 ) -> ReachModel:
-    """Estimate a population of people from reaches.
+    """Estimate a population from reaches.
 
     Skew, bow and aim are fitted to each reach by least squares, then split by the method of moments into the median
-    person, spread between people, and spread from reach to reach; the extreme 1 % at either end are clipped. Reaches
-    that pass corners of obstacles count for durations only. Parameters that recordings do not tell stay as in ``base``:
-    corner radius, pauses, the rate of crossing, ``drift_time``; Fitts' slope where all reaches are about equally
-    difficult, and the cost of corners where none is passed.
+    person, spread between participants, and spread from reach to reach; the extreme 1 % at either end are clipped.
+    Reaches that pass corners of obstacles count for durations only. Parameters that recordings do not tell stay as in
+    ``base``: corner radius, pauses, the rate of crossing, ``drift_time``; Fitts' slope where all reaches are about
+    equally difficult, and the cost of corners where none is passed.
 
     Args:
         trajectories: Complete reaches ``(x, y)`` with known goals and regular times, from the onset of movement to its
@@ -207,7 +207,7 @@ def _shape(reach: Trajectory, ahead: Floats, far: float) -> _Shape:
 
 
 def _fit_bows(plain: Sequence[_Measured]) -> _Bows:
-    """The spread is split into that between people, between the directions of a person, and between reaches."""
+    """The spread is split into that between participants, between the directions of a person, and between reaches."""
     bows = _trimmed([one.shape.bow for one in plain])
     d = np.array([one.direction for one in plain])
     waves = np.column_stack([np.ones(len(d)), np.cos(d), np.sin(d), np.cos(2 * d), np.sin(2 * d)])

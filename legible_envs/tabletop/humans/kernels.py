@@ -112,7 +112,7 @@ def round_corner(boxes: Floats, hand: float, corners: Floats, corner: int, radiu
         corners: ``[j, 2]``.
         corner: Which one, 1 to j - 2.
         radius: How far from the corner rounding begins, in metres; at most half a leg. Halved until there is room.
-        path: See :func:`bow_leg`; legs written.
+        path: ``[(j - 1) * LEG + 1, 2]`` legs of :func:`bow_leg`; changed in place.
     """
     at = corner * LEG
     before = norm(corners[corner, 0] - corners[corner - 1, 0], corners[corner, 1] - corners[corner - 1, 1])
@@ -148,9 +148,9 @@ def trace_path(
         hand: Half-width, by which they are grown.
         bounds: ``(x0, y0, x1, y1)`` of the table.
         corners: ``[j, 2]`` the shortest path; both ends included.
-        bow: See :func:`bow_leg`.
-        aim: See :func:`bow_leg`.
-        radius: See :func:`round_corner`.
+        bow: Greatest deviation of each leg to the left, as a share of its length.
+        aim: The same of the part that bends to the other side in the second half.
+        radius: How far from a corner rounding begins, in metres.
         path: ``[(j - 1) * LEG + 1, 2]`` out.
     """
     for leg in range(len(corners) - 1):

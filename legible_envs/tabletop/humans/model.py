@@ -5,8 +5,8 @@ A reach follows the shortest path of the hand (Tung et al., HRI 2024, assume as 
 * progress along it is a minimum-jerk profile (Flash and Hogan, 1985) whose peak of speed comes early,
   ``mj(1 - (1 - t) ** skew)`` at share ``t`` of the duration: people brake longer than they speed up, the more precisely
   they aim (Marteniuk et al., 1987);
-* its legs are bowed sideways, by an amount that differs between people and directions (Atkeson and Hollerbach, 1985;
-  Wolpert et al., 1995), as far as there is room between obstacles;
+* its legs are bowed sideways, by an amount that differs between participants and directions (Atkeson and Hollerbach,
+  1985; Wolpert et al., 1995), as far as there is room between obstacles;
 * its direction is off at first and corrected during the reach (Georgopoulos and Massey, 1988);
 * its duration follows Fitts' law (Fitts, 1954, in the form of MacKenzie, 1992), with a price for every corner passed,
   whose roundness depends on the person;
@@ -14,8 +14,9 @@ A reach follows the shortest path of the hand (Tung et al., HRI 2024, assume as 
 
 The defaults are for hands over a table. Skew (median 1.35, sd of its logarithm .17 in all), bow
 (-.06 to -.15 of the distance) and endpoints (sd 1.5 cm) were found to give simulated reaches the properties of recorded
-ones: with plain minimum jerk a predictor by straight lines beats one that learns from the very people, the reverse of
-what recordings say. :func:`~legible_envs.tabletop.humans.fitting.fit_reaches` finds the numbers of recorded reaches.
+ones: with plain minimum jerk a predictor by straight lines beats one that learns from the very participants, the
+reverse of what recordings say. :func:`~legible_envs.tabletop.humans.fitting.fit_reaches` finds the numbers of recorded
+reaches.
 """
 
 from __future__ import annotations
@@ -111,15 +112,15 @@ class Person:
 class ReachModel:
     """A population of people who reach; the module's docstring names the sources of the model and its numbers.
 
-    Over people and directions, bows have the variance ``bow_spread ** 2 + 2 bow_target ** 2 + bow_trial ** 2``, .035
-    squared with the defaults.
+    Over participants and directions, bows have the variance ``bow_spread ** 2 + 2 bow_target ** 2 + bow_trial ** 2``,
+    .035 squared with the defaults.
 
     Attributes:
-        median: The person in the middle. Parameters without a spread here are the same for all people.
-        skew_spread: Standard deviation of the logarithm of ``skew`` between people.
-        bow_spread: Standard deviation of ``bow`` between people.
+        median: The person in the middle. Parameters without a spread here are the same for all.
+        skew_spread: Standard deviation of the logarithm of ``skew`` between participants.
+        bow_spread: Standard deviation of ``bow`` between participants.
         bow_target: Standard deviation of each of their four ``bow_turns``.
-        duration_spread: Standard deviation of the logarithm of durations between people.
+        duration_spread: Standard deviation of the logarithm of durations between participants.
 
     Raises:
         ValueError: A value is out of range.

@@ -89,7 +89,7 @@ class Surface:
         return CUBE
 
     def shortest_path(self, start: Point, goal: str | Point, crossing: bool) -> Floats:
-        """``(j, 2)`` the shortest path, straight for people who cross obstacles."""
+        """``(j, 2)`` the shortest path, straight for a person who crosses obstacles."""
         route = _Route(start, goal, crossing)
         if route not in self.paths:
             self.paths[route] = self._find_path(start, goal, crossing)
@@ -252,7 +252,7 @@ def simulate_participants(
         n: Number of participants.
         rng: Source of all randomness.
         task: The task; the one of the package that has the layout's objects if None.
-        population: The people to draw participants from; the default population if None.
+        population: Participants are drawn from it; the default population if None.
         executions: How often each participant does the task.
         participant: Names are ``"{participant}/0"``, ``"{participant}/1"``, ….
         condition: Of all trajectories.

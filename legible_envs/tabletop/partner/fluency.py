@@ -118,7 +118,7 @@ class TeamMetrics:
         predictions: One for every reach that ended in taking an object.
         conflicts: How often both wanted the same object: the person took the robot's target, or the robot took
             the person's known goal.
-        goals_lost: How often it was the latter, the price of acting on a wrong guess.
+        goals_lost: How often the robot took the person's known goal, the price of acting on a wrong prediction.
     """
 
     def __init__(self) -> None:

@@ -1,4 +1,4 @@
-"""The person's team at the table: an observer that only believes, or a robot that also acts."""
+"""The person's team at the table: an observer that only predicts, or a robot that also acts."""
 
 from __future__ import annotations
 
