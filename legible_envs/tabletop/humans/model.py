@@ -25,6 +25,7 @@ from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
+from legible_envs.support.validation import real
 from legible_envs.tabletop.objects import Point
 
 __all__ = ["Person", "ReachModel"]
@@ -169,9 +170,5 @@ def check_parameters(
         if entry.name in skipped:
             continue
         value = getattr(parameters, entry.name)
-        is_number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool) and math.isfinite(value)
-        if not is_number or (value < 0 and entry.name not in signed):
-            raise ValueError(
-                f"{entry.name} must be a finite number{'' if entry.name in signed else ' >= 0'}, got {value!r}"
-            )
-        object.__setattr__(parameters, entry.name, float(value))
+        least = -math.inf if entry.name in signed else 0
+        object.__setattr__(parameters, entry.name, real(entry.name, value, least))

@@ -162,7 +162,7 @@ def test_overlap_of_oriented_rectangles_against_shapely():
         ({"table": {"region": [0.5, 0.1, 0.4, 0.2]}}, "x0 < x1"),
         ({"table": {"starts": {"home": [3, 3]}}}, "off the table"),
         ({"table": {"starts": {}}}, "at least one point"),
-        ({"table": {"hand": -1}}, "at least 0"),
+        ({"table": {"hand": -1}}, "the table's `hand` must be a finite number >= 0"),
     ],
 )
 def test_wrong_json_says_where(change, message):

@@ -284,9 +284,9 @@ def test_layouts_of_another_task_are_refused():
         ({"beta": math.nan}, "beta"),
         ({"c": math.inf}, "c must"),
         ({"unit": 0.0}, "unit"),
-        ({"prefix": "sum"}, "prefix must be 'mean'"),
-        ({"prefix": (0.0, 0.5)}, "prefix must be 'mean'"),
-        ({"prefix": ()}, "prefix must be 'mean'"),
+        ({"prefix": "sum"}, "`prefix` must be 'mean'"),
+        ({"prefix": (0.0, 0.5)}, "`prefix` must be 'mean'"),
+        ({"prefix": ()}, "`prefix` must be 'mean'"),
         ({"ties": "first"}, "ties"),
     ],
 )
