@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from legible_envs.errors import LayoutError
 from legible_envs.overcooked.grid import NEIGHBOURS, Cell
-from legible_envs.support.validation import integer, shown
+from legible_envs.support.validation import entries, integer, shown
 
 __all__ = [
     "COUNTER",
@@ -47,7 +47,7 @@ def check_shape(shape: object, error: Callable[[str], Exception] = ValueError) -
     Raises:
         ValueError: Or what ``error`` makes of the message: not two whole numbers, or a side that no kitchen has.
     """
-    sides = list(shape) if isinstance(shape, Iterable) and not isinstance(shape, str | Mapping) else []
+    sides = entries(shape)
     if len(sides) != 2:
         raise error(f"`shape` must be two integers (rows, columns) from 3 to {MAX_SIDE}, got {shown(shape)}")
     rows, cols = (

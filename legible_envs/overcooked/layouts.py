@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
+from inspect import signature
 from typing import Any, Final, Protocol, runtime_checkable
 
 import numpy as np
 
 from legible_envs.errors import LayoutError
 from legible_envs.overcooked.layout import OvercookedLayout, check_shape
-from legible_envs.support.validation import choice, integer, real
+from legible_envs.support.validation import choice, integer, real, shown
 
 __all__ = [
     "DEFAULT_KITCHEN",
@@ -90,6 +91,8 @@ class RandomLayouts:
         self.obstacle_rate = real("obstacle_rate", obstacle_rate, 0, 1, closed="left")
         self.num_layouts = None if num_layouts is None else integer("num_layouts", num_layouts, 1, also="None")
         self.layout_seed = integer("layout_seed", layout_seed, 0, math.inf, whole_floats=True)
+        if not isinstance(workspace, Mapping | None):
+            raise ValueError(f"`workspace` must be None or a mapping of arguments, got {shown(workspace)}")
         self.workspace = dict(workspace or {})
         self._workspace: Any = None
         self._layouts: tuple[OvercookedLayout, ...] | None = None
@@ -166,7 +169,7 @@ class LayoutSet:
         self.shape = check_shape(shape)
         self.layouts = tuple(read_layout(layout, self.shape) for layout in layouts)
         if not self.layouts:
-            raise LayoutError("a set of layouts needs at least one", rule="type")
+            raise LayoutError("`layouts` must hold at least one kitchen, got none", rule="type")
 
     def sample(self, rng: np.random.Generator) -> OvercookedLayout:
         """Draw one kitchen; all randomness comes from ``rng``."""
@@ -196,8 +199,13 @@ def read_distribution(value: Any, shape: tuple[int, int]) -> LayoutDistribution:
     elif isinstance(value, Mapping):
         arguments = {"shape": shape, **value}
         if arguments.pop("kind", None) == "random":
-            if tuple(arguments["shape"]) != shape:
-                raise ValueError(f"`layouts` is of shape {tuple(arguments['shape'])}, the environment of shape {shape}")
+            known = list(signature(RandomLayouts).parameters)
+            unknown = sorted(str(key) for key in arguments if key not in known)
+            if unknown:
+                raise ValueError(f"`layouts` has unknown keys {unknown}; known: {known}")
+            own = check_shape(arguments["shape"])
+            if own != shape:
+                raise ValueError(f"`layouts` is of shape {own}, the environment of shape {shape}")
             return RandomLayouts(**arguments)
     elif isinstance(value, LayoutDistribution):
         if tuple(getattr(value, "shape", shape)) != shape:
@@ -207,7 +215,7 @@ def read_distribution(value: Any, shape: tuple[int, int]) -> LayoutDistribution:
         return LayoutSet(value, shape)
     raise ValueError(
         "`layouts` must be 'random', 'random:train', 'random:test', a mapping with kind='random', a list of "
-        f"kitchens or an object with sample(rng), got {value!r}"
+        f"kitchens or an object with sample(rng), got {shown(value)}"
     )
 
 
@@ -244,8 +252,8 @@ def read_layout(value: Any, shape: tuple[int, int]) -> OvercookedLayout:
         layout = _read_array(value, shape)
     else:
         raise LayoutError(
-            "expected an OvercookedLayout, an ASCII drawing, a nested list of symbols or a genome, "
-            f"got {type(value).__name__}",
+            "a `layout` must be an OvercookedLayout, an ASCII drawing, a nested list of symbols or a genome, "
+            f"got {type(value).__name__}: {shown(value)}",
             rule="type",
         )
     if layout.shape != shape:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Final
+from collections.abc import Sequence
+from typing import Final
 
 from legible_envs.errors import TaskError
 from legible_envs.overcooked.layout import INGREDIENTS
-from legible_envs.support.validation import shown
+from legible_envs.support.validation import entries, shown
 from legible_envs.tasks import Subtask, TaskGraph
 
 __all__ = ["PAPER_SOUPS", "Recipe", "check_recipes", "soup_task"]
@@ -30,13 +30,13 @@ def check_recipes(recipes: Sequence[Sequence[str]]) -> tuple[Recipe, ...]:
         TaskError: No recipe, an empty one, an unknown ingredient, or one soup's ingredients strictly contained in
             another's (a pot that starts by itself could never tell which is meant).
     """
-    listed = _as_list(recipes)
+    listed = entries(recipes)
     if not listed:
         raise TaskError(f"`recipes` must be at least one recipe, each a sequence of ingredients, got {shown(recipes)}")
     normalised = []
     for number, given in enumerate(listed, 1):
-        recipe = _as_list(given)
-        if not recipe or any(ingredient not in INGREDIENTS for ingredient in recipe):
+        recipe = entries(given)
+        if not recipe or not all(isinstance(i, str) and i in INGREDIENTS for i in recipe):
             raise TaskError(
                 f"recipe {number} of `recipes` must be ingredients out of {list(INGREDIENTS)}, got {shown(given)}"
             )
@@ -46,11 +46,6 @@ def check_recipes(recipes: Sequence[Sequence[str]]) -> tuple[Recipe, ...]:
             if len(small) < len(large) and not Counter(small) - Counter(large):
                 raise TaskError(f"recipe {small} is contained in {large}: the pot would start at the smaller one")
     return tuple(normalised)
-
-
-def _as_list(value: object) -> list[Any]:
-    """The entries of a sequence; none where a value is a text or holds nothing."""
-    return [] if isinstance(value, str | Mapping) or not isinstance(value, Iterable) else list(value)
 
 
 def soup_task(recipes: Sequence[Sequence[str]] = PAPER_SOUPS, pots: int | None = None) -> TaskGraph:

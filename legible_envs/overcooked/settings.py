@@ -142,9 +142,9 @@ class KitchenSettings:
 
 def _read_shaping(shaping: bool | Mapping[str, float]) -> Mapping[str, float]:
     if isinstance(shaping, Mapping):
-        unknown = sorted(set(shaping) - set(SHAPING))
+        unknown = sorted(str(key) for key in shaping if key not in SHAPING)
         if unknown:
-            raise ValueError(f"unknown shaping rewards {unknown}; known: {list(SHAPING)}")
+            raise ValueError(f"unknown rewards {unknown} in `shaping`; known: {list(SHAPING)}")
         return {key: real(f"reward {key!r} of `shaping`", shaping.get(key, 0.0)) for key in SHAPING}
     return SHAPING if flag("shaping", shaping, also="a mapping of rewards,") else dict.fromkeys(SHAPING, 0.0)
 

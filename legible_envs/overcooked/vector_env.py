@@ -27,7 +27,7 @@ from legible_envs.overcooked.layouts import read_layout
 from legible_envs.overcooked.rendering.board import draw_small, tile_pictures
 from legible_envs.overcooked.settings import KitchenSettings, PackedKitchen, count_pots
 from legible_envs.support.specs import JsonSpec, check_options
-from legible_envs.support.validation import integer
+from legible_envs.support.validation import choice, integer, is_integer
 
 __all__ = ["OvercookedVectorEnv"]
 
@@ -68,11 +68,12 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
         **kwargs: Any,
     ) -> None:
         super().__init__()
-        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        asked = getattr(autoreset_mode, "value", autoreset_mode)
+        self.autoreset_mode = AutoresetMode(choice("autoreset_mode", asked, [mode.value for mode in AutoresetMode]))
         self.metadata = {**OvercookedEnv.metadata, "autoreset_mode": self.autoreset_mode}
         self._set_render_mode(render_mode)
         self.num_envs = integer("num_envs", num_envs, 1, whole_floats=True)
-        if max_episode_steps is not None and max_episode_steps != -1:
+        if max_episode_steps is not None and not (is_integer(max_episode_steps) and max_episode_steps == -1):
             max_episode_steps = integer(
                 "max_episode_steps", max_episode_steps, 1, whole_floats=True, also="None or -1 for no limit,"
             )

@@ -7,12 +7,12 @@ Every refusal has one form: which argument, what was expected, what came. For ex
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Literal, TypeVar
 
 import numpy as np
 
-__all__ = ["LARGEST", "choice", "flag", "integer", "integers", "is_integer", "is_real", "real", "shown"]
+__all__ = ["LARGEST", "choice", "entries", "flag", "integer", "integers", "is_integer", "is_real", "real", "shown"]
 
 T = TypeVar("T")
 Closed = Literal["both", "left", "right", "neither"]
@@ -182,12 +182,24 @@ def flag(name: str, value: object, *, also: str = "", error: MakeError = ValueEr
     raise error(_refusal(name, "True or False", value, also, ""))
 
 
+def entries(value: object) -> list[Any]:
+    """The entries of a list, tuple, array or other iterable; none where a value is a text, a mapping or no iterable.
+
+    Example:
+        >>> entries((7, 7)), entries(np.arange(2)), entries("ab"), entries(None)
+        ([7, 7], [0, 1], [], [])
+    """
+    if isinstance(value, np.ndarray):
+        return list(value.tolist()) if value.ndim else []
+    return list(value) if isinstance(value, Iterable) and not isinstance(value, str | bytes | Mapping) else []
+
+
 def shown(value: object) -> str:
     """A value as messages show it: its ``repr``, cut where that is long."""
     try:
         text = repr(value)
     except Exception:  # such as that of a whole number of more than 4,300 digits
-        text = f"a {type(value).__name__} that cannot be shown"
+        text = f"an object of type {type(value).__name__} that cannot be shown"
     return text if len(text) <= _SHOWN else text[: _SHOWN - 1] + "…"
 
 

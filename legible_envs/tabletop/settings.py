@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.errors import LayoutError, TaskError
-from legible_envs.support.validation import choice, integer, real
+from legible_envs.support.validation import choice, integer, real, shown
 from legible_envs.tabletop.game.game import CONTACTS, GameRules
 from legible_envs.tabletop.layout import TabletopLayout
 from legible_envs.tabletop.objects import Point, point
@@ -52,7 +52,7 @@ def read_task(value: object) -> TabletopTask:
     if isinstance(value, str):
         return TabletopTask.named(value)
     raise TaskError(
-        f"`task` must be a TabletopTask, a name, a path or a mapping, got {type(value).__name__}: {value!r}"
+        f"`task` must be a TabletopTask, a name, a path or a mapping, got {type(value).__name__}: {shown(value)}"
     )
 
 
@@ -80,7 +80,9 @@ def read_layout(value: object, task: TabletopTask, max_obstacles: int) -> Tablet
         layout = task.layout.with_genome(_numbers(value), max_obstacles)
     else:
         raise LayoutError(
-            f"expected a TabletopLayout, JSON, a mapping or a genome, got {type(value).__name__}", rule="type"
+            "a `layout` must be a TabletopLayout, JSON, a mapping or a genome, got "
+            f"{type(value).__name__}: {shown(value)}",
+            rule="type",
         )
     _check_of_task(layout, task, max_obstacles)
     layout.validate()

@@ -22,7 +22,7 @@ from legible_envs.overcooked.layout import (
     check_shape,
 )
 from legible_envs.overcooked.scoring.genome_kernels import Geometry
-from legible_envs.support.validation import flag, integer, shown
+from legible_envs.support.validation import entries, flag, integer, shown
 
 __all__ = ["DesignRules"]
 
@@ -74,8 +74,9 @@ class DesignRules:
 
     @staticmethod
     def _checked_stations(stations: Sequence[str]) -> tuple[str, ...]:
-        names = tuple(stations) if isinstance(stations, Iterable) and not isinstance(stations, str | Mapping) else ()
-        if any(name not in STATION_TYPES for name in names) or len(set(names)) != len(names) or len(names) < 2:
+        names = tuple(entries(stations))
+        are_types = all(isinstance(name, str) and name in STATION_TYPES for name in names)
+        if not are_types or len(set(names)) != len(names) or len(names) < 2:
             raise LayoutError(
                 f"`stations` must be at least two different ones of {list(STATION_TYPES)}, got {shown(stations)}",
                 rule="station",
@@ -290,7 +291,7 @@ def _read_cell(name: str, cell: object) -> Cell:
         LayoutError: Not two whole numbers; its ``rule`` is the argument's name.
     """
     error = partial(LayoutError, rule=name)
-    numbers = list(cell) if isinstance(cell, Iterable) and not isinstance(cell, str | Mapping) else []
+    numbers = entries(cell)
     if len(numbers) != 2:
         raise error(f"each cell in `{name}` must be (row, column), got {shown(cell)}")
     row, col = (integer(f"a row or column in `{name}`", i, whole_floats=True, error=error) for i in numbers)

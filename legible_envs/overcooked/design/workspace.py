@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from legible_envs.errors import LayoutError
+from legible_envs.errors import LayoutError, TaskError
 from legible_envs.observer import ObserverModel, Ties, check_prefix
 from legible_envs.overcooked.design import genome_kernels as kernels
 from legible_envs.overcooked.design.keys import KitchenKeys
@@ -23,7 +23,7 @@ from legible_envs.overcooked.scoring.boltzmann import HumanModel, HumanName
 from legible_envs.overcooked.scoring.genome_kernels import score_genomes, valid_genomes
 from legible_envs.overcooked.scoring.scorer import OvercookedScorer
 from legible_envs.overcooked.scoring.tables import make_tables
-from legible_envs.support.validation import choice, real, shown
+from legible_envs.support.validation import choice, entries, integer, real, shown
 from legible_envs.tasks import TaskGraph
 from legible_envs.workspace import Array, Workspace, as_batch, as_single
 
@@ -121,10 +121,16 @@ class OvercookedWorkspace(Workspace):
         observer = ObserverModel(beta, c, check_prefix(prefix), ties, tie_tolerance)
         self.relocation_cost = real("relocation_cost", relocation_cost, 0)
         self.recipes = check_recipes(recipes)
-        self.pots = pots
+        self.pots = None if pots is None else integer("pots", pots, 1, also="None", error=TaskError)
         self._custom_task = TaskGraph.from_dict(task) if isinstance(task, Mapping) else task
+        if not isinstance(self._custom_task, TaskGraph | None):
+            raise TaskError(f"`task` must be None, a TaskGraph or its to_dict(), got {shown(task)}")
         self.task = self._custom_task or soup_task(self.recipes, pots)
         self.start_from = OvercookedLayout.from_ascii(start_from) if isinstance(start_from, str) else start_from
+        if not isinstance(self.start_from, OvercookedLayout | None):
+            raise LayoutError(
+                f"`start_from` must be None, an OvercookedLayout or a drawing, got {shown(start_from)}", rule="type"
+            )
         self.rules = DesignRules(
             shape,
             stations,
@@ -159,8 +165,9 @@ class OvercookedWorkspace(Workspace):
     def _checked_ranked(self, ranked: Sequence[str] | str | None) -> tuple[str, ...]:
         if ranked is None:
             ranked = [name for name in self.stations if name in INGREDIENTS] or self.stations
-        names = self.stations if ranked == "all" else tuple(ranked) if isinstance(ranked, Iterable) else ()
-        if not names or any(name not in self.stations for name in names) or len(set(names)) != len(names):
+        names = self.stations if isinstance(ranked, str) and ranked == "all" else tuple(entries(ranked))
+        are_stations = all(isinstance(name, str) and name in self.stations for name in names)
+        if not names or not are_stations or len(set(names)) != len(names):
             raise ValueError(f"`ranked` must be 'all' or different ones of {list(self.stations)}, got {shown(ranked)}")
         return names
 

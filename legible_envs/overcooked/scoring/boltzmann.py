@@ -80,7 +80,7 @@ class HumanModel:
     def __post_init__(self) -> None:
         choice("human", self.name, get_args(HumanName))
         if self.name == "shortest":
-            given = [key for key in ("rationality", "horizon") if getattr(self, key) is not None]
+            given = [f"`{key}`" for key in ("rationality", "horizon") if getattr(self, key) is not None]
             if given:
                 raise ValueError(f"{' and '.join(given)} belong to human='boltzmann', got human='shortest'")
             return

@@ -11,10 +11,10 @@ from typing import Any, ClassVar, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from legible_envs.errors import LayoutError
+from legible_envs.errors import LayoutError, TaskError
 from legible_envs.observer import ObserverModel, Ties
 from legible_envs.rollouts.trajectory import Trajectory
-from legible_envs.support.validation import choice, flag, real, shown
+from legible_envs.support.validation import choice, entries, flag, real, shown
 from legible_envs.tabletop.design import genome_kernels as kernels
 from legible_envs.tabletop.design import measures
 from legible_envs.tabletop.design import validity_kernels as validity
@@ -153,7 +153,7 @@ class TabletopWorkspace(Workspace):
             self.baseline if self.start_from is None else self.start_from,
             moves_objects=condition != "obstacles",
             moves_obstacles=condition != "placement",
-            max_obstacles=max_obstacles,
+            max_obstacles=self.scorer.max_obstacles,
             obstacle_size=self.scorer.obstacle_size,
             max_detour=max_detour,
             start_clearance=real("start_clearance", start_clearance, 0),
@@ -182,8 +182,9 @@ class TabletopWorkspace(Workspace):
         if ranked is None:
             first = {goal for subtask in self.task.graph.subtasks if not subtask.after for goal in subtask.goals}
             ranked = [name for name in movable if name in first] or movable
-        names = tuple(movable) if ranked == "all" else tuple(ranked) if isinstance(ranked, Iterable) else ()
-        if not names or any(name not in self.task.layout.goals for name in names) or len(set(names)) != len(names):
+        names = tuple(movable if isinstance(ranked, str) and ranked == "all" else entries(ranked))
+        are_objects = all(isinstance(name, str) and name in self.task.layout.goals for name in names)
+        if not names or not are_objects or len(set(names)) != len(names):
             raise ValueError(
                 f"`ranked` must be 'all' or different ones of {list(self.task.layout.goals)}, got {shown(ranked)}"
             )
@@ -491,4 +492,6 @@ def _as_task(task: TabletopTask | Mapping[str, Any] | str) -> TabletopTask:
         return task
     if isinstance(task, Mapping):
         return TabletopTask.from_dict(task)
+    if not isinstance(task, str):
+        raise TaskError(f"`task` must be a TabletopTask, a name, a path or a mapping, got {shown(task)}")
     return TabletopTask.from_yaml(task) if task.endswith((".yaml", ".yml")) else TabletopTask.named(task)

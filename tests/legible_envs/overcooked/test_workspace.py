@@ -271,7 +271,7 @@ def test_bad_genomes():
         ({"beta": float("nan")}, ValueError, "`beta` must be a finite number >= 0, got nan"),
         ({"ties": "first"}, ValueError, "`ties` must be 'expected' or 'strict', got 'first'"),
         ({"human": "drunk"}, ValueError, "`human` must be 'shortest' or 'boltzmann', got 'drunk'"),
-        ({"pots": 0}, TaskError, "max_open"),
+        ({"pots": 0}, TaskError, "`pots` must be None or an integer >= 1, got 0"),
         ({"stations": ("onion", "onion")}, LayoutError, "different"),
         ({"stations": ("onion", "fork")}, LayoutError, "fork|different"),
         ({"ranked": ("fork",)}, ValueError, "ranked"),
