@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol
 
 from benchmarks.trials.functions import name_of, path_of, resolve
 from benchmarks.trials.store import Rows, Trial, TrialStore, plain
+from legible_envs.support.validation import integer
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -180,9 +181,7 @@ def _pool(workers: int | None, scheduler: str | None, num_trials: int) -> Pool:
         return ClusterPool(scheduler)
     from benchmarks.trials.local import InProcess, LocalPool, num_cores
 
-    count = num_cores() if workers is None else workers
-    if count < 1:
-        raise ValueError(f"workers must be at least 1, got {workers}")
+    count = num_cores() if workers is None else integer("workers", workers, 1, also="None")
     return InProcess() if count == 1 else LocalPool(min(count, num_trials))
 
 

@@ -214,11 +214,12 @@ def simulate_participants(
 
     Raises:
         LayoutError: The task cannot be done in this kitchen.
-        ValueError: Unknown population.
+        ValueError: Unknown population, or a number out of range.
     """
     task = task or soup_task()
     if population is None:
         population = "boltzmann"
+    n, executions = integer("n", n, 0), integer("executions", executions, 0)
     if isinstance(population, str) and population not in _POPULATIONS:
         raise ValueError(f"`population` must be one of {list(_POPULATIONS)} or a callable, got {population!r}")
     draw = _POPULATIONS[population] if isinstance(population, str) else population
