@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from legible_envs.support.validation import choice, is_real, real, shown
+from legible_envs.support.validation import choice, entries, is_real, real, shown
 
 __all__ = ["ObserverModel", "PrefixSpec", "Ties", "check_prefix"]
 
@@ -29,8 +29,8 @@ def check_prefix(prefix: str | float | Iterable[float]) -> PrefixSpec:
         if prefix == "sum":
             return "sum"
         raise ValueError(f"`prefix` must be 'mean', 'sum' or a tuple of fractions in (0, 1], got {prefix!r}")
-    fractions = tuple(prefix if isinstance(prefix, Iterable) else (prefix,))
-    if not fractions or not all(is_real(f) and 0 < f <= 1 for f in fractions):
+    fractions = entries(prefix) or [prefix]
+    if not all(is_real(f) and 0 < f <= 1 for f in fractions):
         raise ValueError(f"`prefix` must be 'mean', 'sum' or a tuple of fractions in (0, 1], got {shown(prefix)}")
     return tuple(float(f) for f in fractions)
 
