@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from legible_envs.support.validation import check_finite
+from legible_envs.support.validation import choice, entries, is_real, real, shown
 
 __all__ = ["ObserverModel", "PrefixSpec", "Ties", "check_prefix"]
 
@@ -28,11 +28,11 @@ def check_prefix(prefix: str | float | Iterable[float]) -> PrefixSpec:
             return "mean"
         if prefix == "sum":
             return "sum"
-        raise ValueError(f"prefix must be 'mean', 'sum' or a tuple of fractions in (0, 1], got {prefix!r}")
-    fractions = tuple(float(f) for f in (prefix if isinstance(prefix, Iterable) else (prefix,)))
-    if not fractions or not all(0 < f <= 1 for f in fractions):
-        raise ValueError(f"prefix must be 'mean', 'sum' or a tuple of fractions in (0, 1], got {prefix!r}")
-    return fractions
+        raise ValueError(f"`prefix` must be 'mean', 'sum' or a tuple of fractions in (0, 1], got {prefix!r}")
+    fractions = entries(prefix) or [prefix]
+    if not all(is_real(f) and 0 < f <= 1 for f in fractions):
+        raise ValueError(f"`prefix` must be 'mean', 'sum' or a tuple of fractions in (0, 1], got {shown(prefix)}")
+    return tuple(float(f) for f in fractions)
 
 
 @dataclass(frozen=True)
@@ -67,13 +67,11 @@ class ObserverModel:
     unit: float = 1.0
 
     def __post_init__(self) -> None:
-        for name in ("beta", "c", "tie_tolerance", "unit"):
-            object.__setattr__(self, name, check_finite(name, getattr(self, name), minimum=0.0))
-        if self.unit == 0:
-            raise ValueError("unit must be a finite number > 0 of steps or metres, got 0")
+        for name in ("beta", "c", "tie_tolerance"):
+            object.__setattr__(self, name, real(name, getattr(self, name), 0))
+        object.__setattr__(self, "unit", real("unit", self.unit, 0, closed="neither", unit="steps or metres"))
         object.__setattr__(self, "prefix", check_prefix(self.prefix))
-        if self.ties not in get_args(Ties):
-            raise ValueError(f"ties must be one of {list(get_args(Ties))}, got {self.ties!r}")
+        choice("ties", self.ties, get_args(Ties))
 
     @classmethod
     def in_metres(

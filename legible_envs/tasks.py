@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from legible_envs.errors import TaskError
+from legible_envs.support.validation import integer
 from legible_envs.task_states import StateSpace, SubtaskClass
 
 if TYPE_CHECKING:
@@ -59,8 +60,8 @@ class Subtask:
             raise TaskError(f"subtask {self.name!r} has no goals; give at least one")
         if len(set(self.goals)) != len(self.goals):
             raise TaskError(f"subtask {self.name!r} names a goal twice: {self.goals}")
-        if isinstance(self.count, bool) or not isinstance(self.count, int) or self.count < 1:
-            raise TaskError(f"subtask {self.name!r}: `count` must be an integer >= 1, got {self.count!r}")
+        count = integer(f"subtask {self.name!r}: `count`", self.count, 1, error=TaskError)
+        object.__setattr__(self, "count", count)
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,10 +169,9 @@ class TaskGraph:
                 if member in seen:
                     raise TaskError(f"subtask {member!r} is in group {seen[member]!r} and in group {group!r}")
                 seen[member] = group
-        if self.max_open is not None and (
-            isinstance(self.max_open, bool) or not isinstance(self.max_open, int) or self.max_open < 1
-        ):
-            raise TaskError(f"`max_open` must be None or an integer >= 1, got {self.max_open!r}")
+        if self.max_open is not None:
+            max_open = integer("max_open", self.max_open, 1, also="None", error=TaskError)
+            object.__setattr__(self, "max_open", max_open)
 
     def _check_acyclic(self) -> None:
         waits = {s.name: set(s.after) for s in self.subtasks}

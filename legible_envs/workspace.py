@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import inspect
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, get_args
 
@@ -390,14 +390,3 @@ def as_single(genome: npt.ArrayLike, size: int) -> npt.NDArray[Any]:
     if array.shape != (size,):
         raise ValueError(f"expected one genome of shape ({size},), got {array.shape}")
     return as_batch(array[None], size)
-
-
-def check_choice(name: str, value: Any, allowed: Sequence[Any]) -> Any:
-    """Return ``value`` if it is allowed.
-
-    Raises:
-        ValueError: It is not; the message names the parameter and what it may be.
-    """
-    if value not in allowed:
-        raise ValueError(f"{name} must be one of {list(allowed)}, got {value!r}")
-    return value

@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from legible_envs.support.validation import choice, integer, integers
 from legible_envs.workspace import Workspace
 from optimizers.emitters.registry import EmitterSpec
 from optimizers.errors import SearchInterrupted
@@ -183,14 +184,11 @@ def _paired(
 def _check_budget(
     evaluations: int | None, iterations: tuple[int, int] | None, initial: int, resume: object, checkpoint: object
 ) -> None:
-    if evaluations is not None and evaluations < 1:
-        raise ValueError(f"evaluations must be at least 1, got {evaluations}")
+    integers(1, evaluations=evaluations)
     if iterations is not None and (len(iterations) != 2 or iterations[0] < 1 or iterations[1] < 0):
-        raise ValueError(f"iterations must be (random layouts >= 1, climbs >= 0), got {iterations!r}")
-    if initial < 1:
-        raise ValueError(f"initial must be at least 1, got {initial}")
-    if resume not in (True, False, "auto"):
-        raise ValueError(f"resume must be True, False or 'auto', got {resume!r}")
+        raise ValueError(f"`iterations` must be (random layouts >= 1, climbs >= 0), got {iterations!r}")
+    integer("initial", initial, 1)
+    choice("resume", resume, (True, False, "auto"))
     if resume and checkpoint is None:
         raise ValueError("resume needs checkpoint=, the folder of the run")
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 from benchmarks.trials.attempts import Outcome, Pool
 from benchmarks.trials.functions import name_of, path_of
 from benchmarks.trials.store import Trial, TrialStore
+from legible_envs.support.validation import integer
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -151,7 +152,5 @@ def _pool(workers: int | None, scheduler: str | None, num_trials: int) -> Pool:
         return ClusterPool(scheduler)
     from benchmarks.trials.local import InProcess, LocalPool, num_cores
 
-    count = num_cores() if workers is None else workers
-    if count < 1:
-        raise ValueError(f"workers must be at least 1, got {workers}")
+    count = num_cores() if workers is None else integer("workers", workers, 1, also="None")
     return InProcess() if count == 1 else LocalPool(min(count, num_trials))

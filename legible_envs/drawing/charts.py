@@ -22,6 +22,7 @@ from matplotlib.textpath import TextToPath
 
 from legible_envs.drawing.chart_files import FORMATS, render
 from legible_envs.support.files import write_atomically
+from legible_envs.support.validation import choice
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -134,8 +135,7 @@ def styled(size: ChartSize = "report", *, font: str | None = None) -> Iterator[S
     Raises:
         ValueError: There is no such size, or no such font.
     """
-    if size not in SIZES:
-        raise ValueError(f"size must be one of {list(SIZES)}, got {size!r}")
+    choice("size", size, SIZES)
     text = SIZES[size].text
     changes: dict[str, Any] = {"font.size": text, "lines.linewidth": 0.18 * text, "lines.markersize": 0.52 * text}
     changes["lines.markeredgewidth"] = 0.085 * text

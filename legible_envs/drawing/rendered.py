@@ -9,6 +9,8 @@ import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
+from legible_envs.support.validation import choice
+
 __all__ = ["Rendered", "Windowed"]
 
 
@@ -26,9 +28,9 @@ class Windowed:
         Raises:
             ValueError: The environment has no such mode.
         """
-        if mode is not None and mode not in self.metadata["render_modes"]:
-            raise ValueError(f"`render_mode` must be None or one of {self.metadata['render_modes']}, got {mode!r}")
-        self.render_mode = mode
+        self.render_mode = (
+            None if mode is None else choice("render_mode", mode, self.metadata["render_modes"], also="None")
+        )
 
     def _show(self, picture: npt.NDArray[np.uint8]) -> None:
         if self._window is None:

@@ -12,15 +12,14 @@ import numpy.typing as npt
 from legible_envs.drawing.canvas import Image, Sprite, paste, rgb, text_sprite
 from legible_envs.drawing.palette import PAGE
 from legible_envs.support.files import write_atomically
+from legible_envs.support.validation import integer
 
 __all__ = ["banner", "check_tile", "draw_side_by_side", "fit_text", "overlay", "save_png"]
 
 
 def check_tile(tile: int) -> int:
     """The tile size as given, if it can be drawn."""
-    if isinstance(tile, bool) or not isinstance(tile, int | np.integer) or not 8 <= tile <= 256:
-        raise ValueError(f"tile must be a whole number of pixels from 8 to 256, got {tile!r}")
-    return int(tile)
+    return integer("tile", tile, 8, 256, unit="pixels")
 
 
 def fit_text(text: str, size: int, colour: str, width: int) -> Sprite:

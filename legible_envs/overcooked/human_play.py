@@ -18,6 +18,7 @@ import numpy.typing as npt
 from legible_envs.overcooked.layout import INGREDIENTS, OvercookedLayout
 from legible_envs.overcooked.recipes import PAPER_SOUPS, Recipe, check_recipes
 from legible_envs.support.files import write_npz
+from legible_envs.support.validation import real
 
 if TYPE_CHECKING:
     from legible_envs.rollouts.trajectory import Trajectory
@@ -203,8 +204,7 @@ def play(
         RuntimeError: There is no screen to open a window on.
         ValueError: A bad number of steps per second.
     """
-    if not 1 <= fps <= _POLLS_PER_SECOND:
-        raise ValueError(f"fps must be 1 to {_POLLS_PER_SECOND} steps per second, got {fps!r}")
+    real("fps", fps, 1, _POLLS_PER_SECOND, unit="steps per second")
     if isinstance(layout, str):
         layout = OvercookedLayout.from_ascii(layout)
     elif not isinstance(layout, OvercookedLayout):

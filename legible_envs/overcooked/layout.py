@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import hashlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import Any, Final
 
@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from legible_envs.errors import LayoutError
 from legible_envs.overcooked.grid import NEIGHBOURS, Cell
+from legible_envs.support.validation import entries, integer, shown
 
 __all__ = [
     "COUNTER",
@@ -23,6 +24,7 @@ __all__ = [
     "STATION_TYPES",
     "SYMBOLS",
     "OvercookedLayout",
+    "check_shape",
 ]
 
 FLOOR: Final = 0
@@ -37,6 +39,22 @@ SYMBOLS: Final = " XVTOCFDPS"
 _CODE_OF: Final = {symbol: code for code, symbol in enumerate(SYMBOLS)}
 _STRAY: Final = {".": " ", "_": " ", "#": "X"}
 MAX_SIDE: Final = 64
+
+
+def check_shape(shape: object, error: Callable[[str], Exception] = ValueError) -> tuple[int, int]:
+    """Rows and columns of a kitchen.
+
+    Raises:
+        ValueError: Or what ``error`` makes of the message: not two whole numbers, or a side that no kitchen has.
+    """
+    sides = entries(shape)
+    if len(sides) != 2:
+        raise error(f"`shape` must be two integers (rows, columns) from 3 to {MAX_SIDE}, got {shown(shape)}")
+    rows, cols = (
+        integer("each side of `shape`", side, 3, MAX_SIDE, whole_floats=True, unit="cells", error=error)
+        for side in sides
+    )
+    return rows, cols
 
 
 class OvercookedLayout:

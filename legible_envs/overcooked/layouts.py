@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
+from inspect import signature
 from typing import Any, Final, Protocol, runtime_checkable
 
 import numpy as np
 
 from legible_envs.errors import LayoutError
-from legible_envs.overcooked.layout import OvercookedLayout
+from legible_envs.overcooked.layout import OvercookedLayout, check_shape
+from legible_envs.support.validation import choice, integer, real, shown
 
 __all__ = [
     "DEFAULT_KITCHEN",
@@ -81,21 +84,15 @@ class RandomLayouts:
         layout_seed: int = 0,
         workspace: Mapping[str, Any] | None = None,
     ) -> None:
-        if split not in SPLITS:
-            raise ValueError(f"`split` must be one of {SPLITS}, got {split!r}")
-        if not 0.0 < test_fraction < 1.0:
-            raise ValueError(f"`test_fraction` must lie between 0 and 1, got {test_fraction!r}")
-        if not 0.0 <= obstacle_rate < 1.0:
-            raise ValueError(f"`obstacle_rate` must be at least 0 and below 1, got {obstacle_rate!r}")
-        if num_layouts is not None and num_layouts < 1:
-            raise ValueError(f"`num_layouts` must be None or at least 1, got {num_layouts!r}")
-        self.shape = (int(shape[0]), int(shape[1]))
-        self.split_name = split
-        self.test_fraction = float(test_fraction)
-        self.split_seed = int(split_seed)
-        self.obstacle_rate = float(obstacle_rate)
-        self.num_layouts = num_layouts
-        self.layout_seed = int(layout_seed)
+        self.shape = check_shape(shape)
+        self.split_name = choice("split", split, SPLITS)
+        self.test_fraction = real("test_fraction", test_fraction, 0, 1, closed="neither")
+        self.split_seed = integer("split_seed", split_seed, high=math.inf, whole_floats=True)
+        self.obstacle_rate = real("obstacle_rate", obstacle_rate, 0, 1, closed="left")
+        self.num_layouts = None if num_layouts is None else integer("num_layouts", num_layouts, 1, also="None")
+        self.layout_seed = integer("layout_seed", layout_seed, 0, math.inf, whole_floats=True)
+        if not isinstance(workspace, Mapping | None):
+            raise ValueError(f"`workspace` must be None or a mapping of arguments, got {shown(workspace)}")
         self.workspace = dict(workspace or {})
         self._workspace: Any = None
         self._layouts: tuple[OvercookedLayout, ...] | None = None
@@ -169,10 +166,10 @@ class LayoutSet:
     def __init__(self, layouts: Sequence[Any], shape: Sequence[int]) -> None:
         from legible_envs.overcooked.layouts import read_layout
 
-        self.shape = (int(shape[0]), int(shape[1]))
+        self.shape = check_shape(shape)
         self.layouts = tuple(read_layout(layout, self.shape) for layout in layouts)
         if not self.layouts:
-            raise LayoutError("a set of layouts needs at least one", rule="type")
+            raise LayoutError("`layouts` must hold at least one kitchen, got none", rule="type")
 
     def sample(self, rng: np.random.Generator) -> OvercookedLayout:
         """Draw one kitchen; all randomness comes from ``rng``."""
@@ -202,8 +199,13 @@ def read_distribution(value: Any, shape: tuple[int, int]) -> LayoutDistribution:
     elif isinstance(value, Mapping):
         arguments = {"shape": shape, **value}
         if arguments.pop("kind", None) == "random":
-            if tuple(arguments["shape"]) != shape:
-                raise ValueError(f"`layouts` is of shape {tuple(arguments['shape'])}, the environment of shape {shape}")
+            known = list(signature(RandomLayouts).parameters)
+            unknown = sorted(str(key) for key in arguments if key not in known)
+            if unknown:
+                raise ValueError(f"`layouts` has unknown keys {unknown}; known: {known}")
+            own = check_shape(arguments["shape"])
+            if own != shape:
+                raise ValueError(f"`layouts` is of shape {own}, the environment of shape {shape}")
             return RandomLayouts(**arguments)
     elif isinstance(value, LayoutDistribution):
         if tuple(getattr(value, "shape", shape)) != shape:
@@ -213,7 +215,7 @@ def read_distribution(value: Any, shape: tuple[int, int]) -> LayoutDistribution:
         return LayoutSet(value, shape)
     raise ValueError(
         "`layouts` must be 'random', 'random:train', 'random:test', a mapping with kind='random', a list of "
-        f"kitchens or an object with sample(rng), got {value!r}"
+        f"kitchens or an object with sample(rng), got {shown(value)}"
     )
 
 
@@ -250,8 +252,8 @@ def read_layout(value: Any, shape: tuple[int, int]) -> OvercookedLayout:
         layout = _read_array(value, shape)
     else:
         raise LayoutError(
-            "expected an OvercookedLayout, an ASCII drawing, a nested list of symbols or a genome, "
-            f"got {type(value).__name__}",
+            "a `layout` must be an OvercookedLayout, an ASCII drawing, a nested list of symbols or a genome, "
+            f"got {type(value).__name__}: {shown(value)}",
             rule="type",
         )
     if layout.shape != shape:

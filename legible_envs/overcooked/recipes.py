@@ -8,6 +8,7 @@ from typing import Final
 
 from legible_envs.errors import TaskError
 from legible_envs.overcooked.layout import INGREDIENTS
+from legible_envs.support.validation import entries, shown
 from legible_envs.tasks import Subtask, TaskGraph
 
 __all__ = ["PAPER_SOUPS", "Recipe", "check_recipes", "soup_task"]
@@ -29,13 +30,16 @@ def check_recipes(recipes: Sequence[Sequence[str]]) -> tuple[Recipe, ...]:
         TaskError: No recipe, an empty one, an unknown ingredient, or one soup's ingredients strictly contained in
             another's (a pot that starts by itself could never tell which is meant).
     """
-    if isinstance(recipes, str) or not recipes:
-        raise TaskError(f"expected at least one recipe, each a sequence of ingredients, got {recipes!r}")
+    listed = entries(recipes)
+    if not listed:
+        raise TaskError(f"`recipes` must be at least one recipe, each a sequence of ingredients, got {shown(recipes)}")
     normalised = []
-    for number, recipe in enumerate(recipes, 1):
-        unknown = [] if isinstance(recipe, str) else [i for i in recipe if i not in INGREDIENTS]
-        if isinstance(recipe, str) or not recipe or unknown:
-            raise TaskError(f"recipe {number} is {recipe!r}; expected ingredients out of {list(INGREDIENTS)}")
+    for number, given in enumerate(listed, 1):
+        recipe = entries(given)
+        if not recipe or not all(isinstance(i, str) and i in INGREDIENTS for i in recipe):
+            raise TaskError(
+                f"recipe {number} of `recipes` must be ingredients out of {list(INGREDIENTS)}, got {shown(given)}"
+            )
         normalised.append(tuple(sorted(recipe, key=INGREDIENTS.index)))
     for small in normalised:
         for large in normalised:

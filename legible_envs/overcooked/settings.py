@@ -14,10 +14,11 @@ from legible_envs.overcooked.game.goals import missing_station
 from legible_envs.overcooked.game.observations import GRID_CHANNELS, NUM_FEATURES, find_routes
 from legible_envs.overcooked.game.rules import GameRules, pack_kitchen, pack_rules
 from legible_envs.overcooked.game.vectors import POT_CELL, Kitchen, Vector
-from legible_envs.overcooked.layout import INGREDIENTS, STATION_TYPES, OvercookedLayout
+from legible_envs.overcooked.layout import INGREDIENTS, STATION_TYPES, OvercookedLayout, check_shape
 from legible_envs.overcooked.layouts import LayoutDistribution, default_layout, read_distribution, read_layout
-from legible_envs.overcooked.recipes import PAPER_SOUPS
+from legible_envs.overcooked.recipes import PAPER_SOUPS, check_recipes
 from legible_envs.overcooked.rendering.board import RGB_TILE
+from legible_envs.support.validation import choice, flag, real
 
 __all__ = ["OBS_TYPES", "SHAPING", "KitchenSettings", "PackedKitchen", "count_pots"]
 
@@ -53,18 +54,14 @@ class KitchenSettings:
         crossing_cost: float = 0.0,
         shaping: bool | Mapping[str, float] = False,
     ) -> None:
-        self.shape = _read_shape(shape)
-        if obs_type not in OBS_TYPES:
-            raise ValueError(f"`obs_type` must be one of {OBS_TYPES}, got {obs_type!r}")
-        if virtual_obstacles not in ("hard", "soft"):
-            raise ValueError(f"`virtual_obstacles` must be 'hard' or 'soft', got {virtual_obstacles!r}")
-        if not np.isfinite(crossing_cost) or crossing_cost < 0:
-            raise ValueError(f"`crossing_cost` must be a finite number >= 0, got {crossing_cost!r}")
+        self.shape = check_shape(shape)
+        self.obs_type = choice("obs_type", obs_type, OBS_TYPES)
+        virtual_obstacles = choice("virtual_obstacles", virtual_obstacles, ("hard", "soft"))
+        crossing_cost = real("crossing_cost", crossing_cost, 0)
         if layout is not None and layouts is not None:
             raise ValueError("give either `layout` (one kitchen) or `layouts` (a distribution), not both")
-        self.obs_type = obs_type
         self.rules = GameRules(
-            recipes=tuple(tuple(recipe) if not isinstance(recipe, str) else recipe for recipe in recipes),  # type: ignore[misc]
+            recipes=check_recipes(recipes),
             cook_time=cook_time,
             soft_obstacles=virtual_obstacles == "soft",
         )
@@ -143,20 +140,13 @@ class KitchenSettings:
         return spaces.Box(np.zeros_like(high), high, dtype=np.uint8)
 
 
-def _read_shape(shape: Sequence[int]) -> tuple[int, int]:
-    sides = tuple(int(side) for side in shape)
-    if len(sides) != 2 or min(sides) < 3 or max(sides) > 64:
-        raise ValueError(f"`shape` must be two numbers (rows, columns) of 3 to 64, got {shape!r}")
-    return sides[0], sides[1]
-
-
 def _read_shaping(shaping: bool | Mapping[str, float]) -> Mapping[str, float]:
     if isinstance(shaping, Mapping):
-        unknown = sorted(set(shaping) - set(SHAPING))
+        unknown = sorted(str(key) for key in shaping if key not in SHAPING)
         if unknown:
-            raise ValueError(f"unknown shaping rewards {unknown}; known: {list(SHAPING)}")
-        return {key: float(shaping.get(key, 0.0)) for key in SHAPING}
-    return SHAPING if shaping else dict.fromkeys(SHAPING, 0.0)
+            raise ValueError(f"unknown rewards {unknown} in `shaping`; known: {list(SHAPING)}")
+        return {key: real(f"reward {key!r} of `shaping`", shaping.get(key, 0.0)) for key in SHAPING}
+    return SHAPING if flag("shaping", shaping, also="a mapping of rewards,") else dict.fromkeys(SHAPING, 0.0)
 
 
 def count_pots(layout: OvercookedLayout) -> int:

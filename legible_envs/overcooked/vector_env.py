@@ -27,6 +27,7 @@ from legible_envs.overcooked.layouts import read_layout
 from legible_envs.overcooked.rendering.board import draw_small, tile_pictures
 from legible_envs.overcooked.settings import KitchenSettings, PackedKitchen, count_pots
 from legible_envs.support.specs import JsonSpec, check_options
+from legible_envs.support.validation import choice, integer, is_integer
 
 __all__ = ["OvercookedVectorEnv"]
 
@@ -72,17 +73,16 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
         **kwargs: Any,
     ) -> None:
         super().__init__()
-        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        asked = getattr(autoreset_mode, "value", autoreset_mode)
+        self.autoreset_mode = AutoresetMode(choice("autoreset_mode", asked, [mode.value for mode in AutoresetMode]))
         self.metadata = {**OvercookedEnv.metadata, "autoreset_mode": self.autoreset_mode}
         self._set_render_mode(render_mode)
-        if num_envs < 1:
-            raise ValueError(f"`num_envs` must be at least 1, got {num_envs}")
-        if max_episode_steps is not None and max_episode_steps < 1 and max_episode_steps != -1:
-            raise ValueError(
-                f"`max_episode_steps` must be positive, or None or -1 for no limit, got {max_episode_steps}"
+        self.num_envs = integer("num_envs", num_envs, 1, whole_floats=True)
+        if max_episode_steps is not None and not (is_integer(max_episode_steps) and max_episode_steps == -1):
+            max_episode_steps = integer(
+                "max_episode_steps", max_episode_steps, 1, whole_floats=True, also="None or -1 for no limit,"
             )
         self.settings = KitchenSettings(**kwargs)
-        self.num_envs = int(num_envs)
         self.max_episode_steps = None if max_episode_steps in (None, -1) else max_episode_steps
         self.single_action_space = spaces.Discrete(NUM_ACTIONS)
         self.single_observation_space = self.settings.observation_space()

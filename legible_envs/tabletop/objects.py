@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from legible_envs.errors import LayoutError
+from legible_envs.support.validation import flag, is_real, real, shown
 
 __all__ = ["CUBE", "OBSTACLE_SIZE", "Table", "TableObject", "VirtualObstacle", "rectangle", "rectangles_overlap"]
 
@@ -29,13 +31,10 @@ def numbers(value: Any, count: int, what: str, *, positive: bool = False) -> tup
     """
     is_list = isinstance(value, Iterable) and not isinstance(value, (str, bytes, Mapping))
     found = list(value) if is_list else [value]
-    ok = len(found) == count and all(
-        isinstance(v, (int, float, np.integer, np.floating)) and not isinstance(v, bool) and math.isfinite(v)
-        for v in found
-    )
+    ok = len(found) == count and all(map(is_real, found))
     if not ok or (positive and min(found) <= 0):
         kind = "positive number" if positive else "finite number"
-        raise LayoutError(f"{what} must be {count} {kind}{'s' if count > 1 else ''}, got {value!r}", rule="number")
+        raise LayoutError(f"{what} must be {count} {kind}{'s' if count > 1 else ''}, got {shown(value)}", rule="number")
     return tuple(float(v) for v in found)
 
 
@@ -105,8 +104,8 @@ class TableObject:
         object.__setattr__(self, "at", point(self.at, what + "at`"))
         object.__setattr__(self, "size", numbers(self.size, 2, what + "size`", positive=True))
         object.__setattr__(self, "angle", numbers(self.angle, 1, what + "angle`")[0])
-        if not isinstance(self.movable, bool):
-            raise LayoutError(f"{what}movable` must be true or false, got {self.movable!r}", rule="schema")
+        movable = flag(what + "movable`", self.movable, error=partial(LayoutError, rule="schema"))
+        object.__setattr__(self, "movable", movable)
 
     @property
     def corners(self) -> npt.NDArray[np.float64]:
@@ -176,9 +175,7 @@ class Table:
                 raise LayoutError(f"start {name!r} at ({x:g}, {y:g}) is off the table of {self.size} m", rule="start")
         object.__setattr__(self, "starts", starts)
         hand = numbers(self.hand, 1, "the table's `hand`")[0]
-        if hand < 0:
-            raise LayoutError(f"the table's `hand` must be at least 0, got {hand!r}", rule="number")
-        object.__setattr__(self, "hand", hand)
+        object.__setattr__(self, "hand", real("the table's `hand`", hand, 0, error=partial(LayoutError, rule="number")))
 
     def __hash__(self) -> int:
         return hash((self.size, self.region, self.assembly, tuple(self.starts.items()), self.hand))

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.errors import LayoutError, TaskError
+from legible_envs.support.validation import choice, integer, real, shown
 from legible_envs.tabletop.game.game import CONTACTS, GameRules
 from legible_envs.tabletop.layout import TabletopLayout
 from legible_envs.tabletop.objects import Point, point
@@ -51,7 +52,7 @@ def read_task(value: object) -> TabletopTask:
     if isinstance(value, str):
         return TabletopTask.named(value)
     raise TaskError(
-        f"`task` must be a TabletopTask, a name, a path or a mapping, got {type(value).__name__}: {value!r}"
+        f"`task` must be a TabletopTask, a name, a path or a mapping, got {type(value).__name__}: {shown(value)}"
     )
 
 
@@ -79,7 +80,9 @@ def read_layout(value: object, task: TabletopTask, max_obstacles: int) -> Tablet
         layout = task.layout.with_genome(_numbers(value), max_obstacles)
     else:
         raise LayoutError(
-            f"expected a TabletopLayout, JSON, a mapping or a genome, got {type(value).__name__}", rule="type"
+            "a `layout` must be a TabletopLayout, JSON, a mapping or a genome, got "
+            f"{type(value).__name__}: {shown(value)}",
+            rule="type",
         )
     _check_of_task(layout, task, max_obstacles)
     layout.validate()
@@ -179,40 +182,24 @@ class TableSettings:
         threshold: float,
     ) -> None:
         self.task = read_task(task)
-        if virtual_obstacles not in ("hard", "soft"):
-            raise ValueError(f"`virtual_obstacles` must be 'hard' or 'soft', got {virtual_obstacles!r}")
-        if contact not in CONTACTS:
-            raise ValueError(f"`contact` must be one of {CONTACTS}, got {contact!r}")
-        if isinstance(max_obstacles, bool) or not isinstance(max_obstacles, int) or max_obstacles < 0:
-            raise ValueError(f"`max_obstacles` must be an integer >= 0, got {max_obstacles!r}")
-        self.max_obstacles = max_obstacles
+        self.max_obstacles = integer("max_obstacles", max_obstacles, 0)
         self.rules = GameRules(
-            virtual_obstacles=virtual_obstacles,  # type: ignore[arg-type]
-            contact=contact,  # type: ignore[arg-type]
-            max_speed=_number("max_speed", max_speed, least=1e-3),
-            slow_speed=_number("slow_speed", slow_speed, least=1e-3),
-            grasp_distance=_number("grasp_distance", grasp_distance),
-            release_distance=_number("release_distance", release_distance),
+            virtual_obstacles=choice("virtual_obstacles", virtual_obstacles, ("hard", "soft")),  # type: ignore[arg-type]
+            contact=choice("contact", contact, CONTACTS),
+            max_speed=real("max_speed", max_speed, 1e-3),
+            slow_speed=real("slow_speed", slow_speed, 1e-3),
+            grasp_distance=real("grasp_distance", grasp_distance, 0),
+            release_distance=real("release_distance", release_distance, 0),
         )
-        self.done_reward = _number("done_reward", done_reward, least=-math.inf)
-        self.time_cost = _number("time_cost", time_cost)
-        self.crossing_cost = _number("crossing_cost", crossing_cost)
-        self.threshold = _number("threshold", threshold, most=1.0)
+        self.done_reward = real("done_reward", done_reward)
+        self.time_cost = real("time_cost", time_cost, 0)
+        self.crossing_cost = real("crossing_cost", crossing_cost, 0)
+        self.threshold = real("threshold", threshold, 0, 1)
         self.layout = self.task.layout if layout is None else self.read(layout)
 
     def read(self, layout: object) -> TabletopLayout:
         """A layout that this environment can play, from any form that :func:`read_layout` takes."""
         return read_layout(layout, self.task, self.max_obstacles)
-
-
-def _number(name: str, value: object, least: float = 0.0, most: float = math.inf) -> float:
-    is_number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
-    number = float(value) if is_number else math.nan  # type: ignore[arg-type]
-    if not math.isfinite(number) or not least <= number <= most:
-        bounds = "" if math.isinf(least) else f" >= {least:g}"
-        bounds += "" if math.isinf(most) else f" and <= {most:g}"
-        raise ValueError(f"`{name}` must be a finite number{bounds}, got {value!r}")
-    return number
 
 
 def keys_to_action(max_speed: float) -> dict[tuple[int, ...], npt.NDArray[np.float32]]:

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from legible_envs.support.validation import integers, real
 from legible_envs.workspace import Workspace
-from optimizers.emitters.base import AddInfo, Seed, WorkspaceEmitter, check_at_least, read_only
+from optimizers.emitters.base import AddInfo, Seed, WorkspaceEmitter, read_only
 from optimizers.emitters.draws import draw_elites, perturbed
 
 if TYPE_CHECKING:
@@ -100,12 +101,10 @@ class AnnealingEmitter(WorkspaceEmitter):
         initial: int = 1000,
         seed: Seed = None,
     ) -> None:
-        check_at_least(1, chains=chains, cycle=cycle, groups=groups, initial=initial)
-        check_at_least(0, resamplings=resamplings)
-        if not heat > 0:
-            raise ValueError(f"heat must be positive, got {heat}")
-        if not 0 < cold <= 1:
-            raise ValueError(f"cold must be above 0 and at most 1, got {cold}")
+        integers(1, chains=chains, cycle=cycle, groups=groups, initial=initial)
+        integers(0, resamplings=resamplings)
+        real("heat", heat, 0, closed="neither")
+        real("cold", cold, 0, 1, closed="right")
         super().__init__(archive, workspace, seed=seed)
         size = int(archive.solution_dim)
         planned_cycle, planned_groups = _plan(evaluations, int(initial), size)

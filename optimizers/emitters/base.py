@@ -8,12 +8,13 @@ import numpy as np
 import numpy.typing as npt
 from ribs.emitters import EmitterBase
 
+from legible_envs.support.validation import integers
 from legible_envs.workspace import Workspace
 
 if TYPE_CHECKING:
     from ribs.archives import ArchiveBase
 
-__all__ = ["AddInfo", "CountingEmitter", "Seed", "WorkspaceEmitter", "check_at_least", "read_only", "seed_sequence"]
+__all__ = ["AddInfo", "CountingEmitter", "Seed", "WorkspaceEmitter", "read_only", "seed_sequence"]
 
 Seed = int | np.random.SeedSequence | None
 AddInfo = dict[str, npt.NDArray[Any]]
@@ -90,7 +91,7 @@ class CountingEmitter(WorkspaceEmitter):
     def __init__(
         self, archive: ArchiveBase, workspace: Workspace, *, iterations: int | None = None, seed: Seed = None
     ) -> None:
-        check_at_least(0, iterations=iterations)
+        integers(0, iterations=iterations)
         super().__init__(archive, workspace, seed=seed)
         self.finished = 0
         self._limit = iterations
@@ -99,17 +100,6 @@ class CountingEmitter(WorkspaceEmitter):
     def done(self) -> bool:
         """Whether all ``iterations`` have ended."""
         return self._limit is not None and self.finished >= self._limit
-
-
-def check_at_least(least: int, **counts: int | None) -> None:
-    """Check whole numbers given by name; None stands for a default and passes.
-
-    Raises:
-        ValueError: One is smaller; the message names it.
-    """
-    for name, value in counts.items():
-        if value is not None and value < least:
-            raise ValueError(f"{name} must be at least {least}, got {value}")
 
 
 def seed_sequence(seed: Seed) -> np.random.SeedSequence:

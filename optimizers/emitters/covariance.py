@@ -10,9 +10,10 @@ from ribs.archives import GridArchive
 from ribs.emitters import EvolutionStrategyEmitter
 
 from legible_envs.random_keys import KeyDecoder
+from legible_envs.support.validation import integers, real
 from legible_envs.workspace import Workspace
 from optimizers.emitters.adapter import FloatArchiveView, GenomeAdapter
-from optimizers.emitters.base import Seed, check_at_least, read_only, seed_sequence
+from optimizers.emitters.base import Seed, read_only, seed_sequence
 from optimizers.emitters.draws import draw_elites
 
 if TYPE_CHECKING:
@@ -57,9 +58,8 @@ class _KeyStrategies(GenomeAdapter):
         initial: int,
         seed: Seed,
     ) -> None:
-        check_at_least(1, strategies=strategies, batch_size=batch_size, initial=initial)
-        if not sigma0 > 0:
-            raise ValueError(f"sigma0 must be positive, got {sigma0}")
+        integers(1, strategies=strategies, batch_size=batch_size, initial=initial)
+        real("sigma0", sigma0, 0, closed="neither")
         if strategies is None:
             planned = _MOST if evaluations is None else evaluations // (_ROUNDS * batch_size)
             strategies = max(1, min(_MOST, planned))
@@ -156,13 +156,11 @@ class CmaMaeEmitter(_KeyStrategies):
         initial: int = 1000,
         seed: Seed = None,
     ) -> None:
-        if not 0 <= learning_rate <= 1:
-            raise ValueError(f"learning_rate must be between 0 and 1, got {learning_rate}")
         super().__init__(
             archive,
             workspace,
             name="cma-mae",
-            learning_rate=float(learning_rate),
+            learning_rate=real("learning_rate", learning_rate, 0, 1),
             strategies=strategies,
             batch_size=batch_size,
             sigma0=sigma0,

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from legible_envs.support.validation import choice, integers, real
 from legible_envs.workspace import Workspace
-from optimizers.emitters.base import AddInfo, CountingEmitter, Seed, check_at_least, read_only
+from optimizers.emitters.base import AddInfo, CountingEmitter, Seed, read_only
 from optimizers.emitters.draws import draw_elites
 
 if TYPE_CHECKING:
@@ -75,11 +76,9 @@ class DifferentialEvolutionEmitter(CountingEmitter):
         evaluations: int | None = None,
         seed: Seed = None,
     ) -> None:
-        check_at_least(5, population=population)
-        if strategy not in STRATEGIES:
-            raise ValueError(f"strategy must be one of {', '.join(STRATEGIES)}, got {strategy!r}")
-        if not 0 <= recombination <= 1:
-            raise ValueError(f"recombination must be a probability, got {recombination}")
+        integers(5, population=population)
+        choice("strategy", strategy, STRATEGIES)
+        real("recombination", recombination, 0, 1)
         super().__init__(archive, workspace, iterations=iterations, seed=seed)
         self._decoder = workspace.key_decoder()
         self.population = _default_population(self._decoder.size, evaluations) if population is None else population

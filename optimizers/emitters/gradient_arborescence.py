@@ -8,9 +8,10 @@ import numpy as np
 import numpy.typing as npt
 from ribs.emitters import GradientArborescenceEmitter as RibsGradientArborescenceEmitter
 
+from legible_envs.support.validation import integers, real
 from legible_envs.workspace import Workspace
 from optimizers.emitters.adapter import FloatArchiveView, GenomeAdapter
-from optimizers.emitters.base import Seed, check_at_least, seed_sequence
+from optimizers.emitters.base import Seed, seed_sequence
 
 if TYPE_CHECKING:
     from ribs.archives import ArchiveBase
@@ -80,10 +81,9 @@ class GradientArborescenceEmitter(GenomeAdapter):
             raise ValueError(
                 f"gradients need genomes of real numbers, those of the workspace are {workspace.genome_dtype}"
             )
-        for name, value in (("sigma0", sigma0), ("lr", lr)):
-            if not 0 < value < np.inf:
-                raise ValueError(f"{name} must be a positive number, got {value}")
-        check_at_least(1, batch_size=batch_size, initial=initial)
+        real("sigma0", sigma0, 0, closed="neither")
+        real("lr", lr, 0, closed="neither")
+        integers(1, batch_size=batch_size, initial=initial)
         # Whether there are gradients, and of this objective, shows before anything is scored.
         differentiable = cast("DifferentiableWorkspace", workspace)
         differentiable.gradients(np.empty((0, archive.solution_dim)), objective)

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from legible_envs.support.validation import integers
 from legible_envs.workspace import Workspace
-from optimizers.emitters.base import AddInfo, CountingEmitter, Seed, check_at_least, read_only
+from optimizers.emitters.base import AddInfo, CountingEmitter, Seed, read_only
 from optimizers.emitters.draws import draw_elites
 
 if TYPE_CHECKING:
@@ -77,7 +78,7 @@ class ImproveWorkspaceEmitter(CountingEmitter):
         initial: int = 1000,
         seed: Seed = None,
     ) -> None:
-        check_at_least(1, climbs=climbs, fanout=fanout, initial=initial)
+        integers(1, climbs=climbs, fanout=fanout, initial=initial)
         super().__init__(archive, workspace, iterations=iterations, seed=seed)
         self.climbs = int(climbs) if climbs is not None else _default_climbs(fanout, evaluations, iterations)
         self.fanout = int(fanout)

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy.typing as npt
 
+from legible_envs.support.validation import integers
 from legible_envs.workspace import Workspace
-from optimizers.emitters.base import Seed, WorkspaceEmitter, check_at_least
+from optimizers.emitters.base import Seed, WorkspaceEmitter
 from optimizers.emitters.draws import draw_elites, perturbed
 
 if TYPE_CHECKING:
@@ -44,7 +45,7 @@ class MutationEmitter(WorkspaceEmitter):
         evaluations: int | None = None,
         seed: Seed = None,
     ) -> None:
-        check_at_least(1, batch_size=batch_size)
+        integers(1, batch_size=batch_size)
         super().__init__(archive, workspace, seed=seed)
         planned = _BATCH if evaluations is None else min(_BATCH, max(1, evaluations // _ROUNDS))
         self._batch_size = planned if batch_size is None else int(batch_size)

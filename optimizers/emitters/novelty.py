@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from legible_envs.support.validation import integers, real
 from legible_envs.workspace import Workspace
-from optimizers.emitters.base import AddInfo, Seed, WorkspaceEmitter, check_at_least, read_only
+from optimizers.emitters.base import AddInfo, Seed, WorkspaceEmitter, read_only
 from optimizers.emitters.draws import crossed, draw_elites, perturbed
 
 if TYPE_CHECKING:
@@ -77,11 +78,10 @@ class NoveltyLocalCompetitionEmitter(WorkspaceEmitter):
         evaluations: int | None = None,
         seed: Seed = None,
     ) -> None:
-        check_at_least(2, population=population)
-        check_at_least(1, neighbours=neighbours)
-        for name, value in (("crossover", crossover), ("remember", remember)):
-            if not 0 <= value <= 1:
-                raise ValueError(f"{name} must be a probability, got {value}")
+        integers(2, population=population)
+        integers(1, neighbours=neighbours)
+        real("crossover", crossover, 0, 1)
+        real("remember", remember, 0, 1)
         super().__init__(archive, workspace, seed=seed)
         planned = 128 if evaluations is None else min(128, max(20, evaluations // 100))
         self.population = planned if population is None else int(population)

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy.typing as npt
 
+from legible_envs.support.validation import integers
 from legible_envs.workspace import Workspace
-from optimizers.emitters.base import Seed, WorkspaceEmitter, check_at_least
+from optimizers.emitters.base import Seed, WorkspaceEmitter
 
 if TYPE_CHECKING:
     from ribs.archives import ArchiveBase
@@ -33,7 +34,7 @@ class RandomWorkspaceEmitter(WorkspaceEmitter):
         batch_size: int = 1024,
         seed: Seed = None,
     ) -> None:
-        check_at_least(1, batch_size=batch_size)
+        integers(1, batch_size=batch_size)
         super().__init__(archive, workspace, seed=seed)
         self._batch_size = int(batch_size)
 

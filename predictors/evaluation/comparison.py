@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from legible_envs.support.validation import choice, real
 from predictors.evaluation.statistics import (
     effect_sizes,
     holm,
@@ -105,10 +106,8 @@ def compare_conditions(
     Warns:
         UserWarning: Folds as units; units dropped because a condition lacks them.
     """
-    if not 0 < alpha < 1:
-        raise ValueError(f"`alpha` must be between 0 and 1, got {alpha!r}")
-    if at not in ("each", "mean"):
-        raise ValueError(f"`at` must be 'each' or 'mean', got {at!r}")
+    alpha = real("alpha", alpha, 0, 1, closed="neither")
+    choice("at", at, ("each", "mean"))
     if correct_fractions not in (None, "holm"):
         raise ValueError(f"`correct_fractions` must be 'holm' or None, got {correct_fractions!r}")
     if isinstance(results, Mapping):
@@ -193,8 +192,7 @@ def _chosen(table: pd.DataFrame, factor: str, predictor: str | None, value: str)
 def _with_units(table: pd.DataFrame, factor: str, unit: str) -> pd.DataFrame:
     """The table with a column ``_unit``: the same text, the same independent unit."""
     needed = {"participant": ["participant"], "trajectory": ["trajectory"], "fold": ["repeat", "fold"]}
-    if unit not in needed:
-        raise ValueError(f"`unit` must be one of {list(needed)}, got {unit!r}")
+    choice("unit", unit, needed)
     missing = [name for name in needed[unit] if name not in table]
     if missing:
         raise ValueError(f"unit {unit!r} needs the column {missing[0]!r}")
@@ -212,8 +210,7 @@ def _designed(
     table: pd.DataFrame, factor: str, unit: str, levels: Sequence[Any], design: str
 ) -> tuple[str, pd.DataFrame, int]:
     """Between or within, and only the units that this design can use."""
-    if design not in ("auto", "between", "within"):
-        raise ValueError(f"`design` must be 'auto', 'between' or 'within', got {design!r}")
+    choice("design", design, ("auto", "between", "within"))
     seen = table.groupby("_unit")[factor].nunique()
     if design == "auto":
         if (seen == len(levels)).all():

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import CUTS, Cut, Trajectory
+from legible_envs.support.validation import choice, integer, is_integer, is_real
 from predictors.base import FRACTIONS, GoalPredictor, TieCredit, correctness
 from predictors.evaluation.comparison import Comparison, compare_conditions
 from predictors.evaluation.metrics import tied_shares
@@ -190,8 +191,7 @@ def _check_options(fractions: Sequence[float], cut: Cut, repeats: int) -> None:
         raise ValueError(f"unknown cut {cut!r}; expected one of {list(CUTS)}")
     if not len(fractions) or len(set(fractions)) != len(fractions):
         raise ValueError(f"`fractions` must be at least one, each once, got {fractions!r}")
-    if isinstance(repeats, bool) or not isinstance(repeats, int | np.integer) or repeats < 1:
-        raise ValueError(f"`repeats` must be a number >= 1, got {repeats!r}")
+    integer("repeats", repeats, 1)
 
 
 def _named(specs: Specs) -> dict[str, GoalPredictor]:
@@ -338,8 +338,7 @@ def _splits(
     """Pools to learn from and test sets, one pair per repeat."""
     if rare == "error":
         return [nested_training_sets(trajectories, test_share, rng, groups) for _ in range(repeats)]
-    if rare != "redraw":
-        raise ValueError(f"`rare` must be 'error' or 'redraw', got {rare!r}")
+    choice("rare", rare, ("error", "redraw"))
     if groups is not None:
         raise ValueError("rare='redraw' draws splits of single trajectories; use groups=None")
     names = {name for trajectory in trajectories for name in trajectory.candidates}
@@ -360,11 +359,10 @@ def _splits(
 def _sizes(sizes: Sequence[int | float], available: int) -> list[int]:
     found = []
     for size in sizes:
-        whole = isinstance(size, int | np.integer) and not isinstance(size, bool)
-        count = int(size) if whole else round(size * available)
-        if isinstance(size, bool) or (not whole and not 0 < size <= 1) or not 1 <= count <= available:
+        count = size if is_integer(size) else round(size * available) if is_real(size) and 0 < size <= 1 else 0
+        if not 1 <= count <= available:
             raise ValueError(f"size {size!r} is neither 1..{available} trajectories nor a share in (0, 1] of them")
-        found.append(count)
+        found.append(int(count))
     if not found:
         raise ValueError("`sizes` must name at least one training size")
     return sorted(set(found))

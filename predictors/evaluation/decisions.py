@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import Trajectory
+from legible_envs.support.validation import integer, real
 from predictors.base import TIE_TOLERANCE, GoalPredictor, check_trajectories
 
 if TYPE_CHECKING:
@@ -63,11 +64,9 @@ class ThresholdDecision:
     def __init__(self, predictor: GoalPredictor, threshold: float = 0.9, *, patience: int = 1) -> None:
         if not isinstance(predictor, GoalPredictor):
             raise TypeError(f"`predictor` must be a GoalPredictor, got {type(predictor).__name__}")
-        if isinstance(patience, bool) or not isinstance(patience, int) or patience < 1:
-            raise ValueError(f"`patience` must be a whole number >= 1, got {patience!r}")
+        self.patience = integer("patience", patience, 1)
         self.predictor = predictor
-        self.threshold = _checked_threshold(threshold)
-        self.patience = patience
+        self.threshold = real("threshold", threshold, 0, 1, closed="right")
 
     def __repr__(self) -> str:
         return f"ThresholdDecision({self.predictor!r}, {self.threshold!r}, patience={self.patience})"
@@ -101,7 +100,7 @@ class ThresholdDecision:
         """The rows of :meth:`decide` for several thresholds; :func:`summarise_decisions` makes a curve of them."""
         import pandas as pd
 
-        levels = [_checked_threshold(threshold) for threshold in thresholds]
+        levels = [real("each of `thresholds`", threshold, 0, 1, closed="right") for threshold in thresholds]
         trajectories = check_trajectories(X)
         beliefs = self._beliefs(trajectories)
         rows = [
@@ -243,9 +242,3 @@ def _confident_candidate(belief: npt.NDArray[np.float64], threshold: float) -> i
     if best < threshold - TIE_TOLERANCE or np.count_nonzero(belief >= best - TIE_TOLERANCE) > 1:
         return None
     return int(belief.argmax())
-
-
-def _checked_threshold(threshold: float) -> float:
-    if isinstance(threshold, bool) or not isinstance(threshold, int | float) or not 0 < threshold <= 1:
-        raise ValueError(f"a threshold must be above 0 and at most 1, got {threshold!r}")
-    return float(threshold)

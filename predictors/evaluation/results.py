@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from legible_envs.rollouts.trajectory import CUTS
+from legible_envs.support.validation import choice, real
 from predictors.evaluation.metrics import calibration_error, clustered_interval, log_loss, weighted_scores
 
 if TYPE_CHECKING:
@@ -96,12 +97,10 @@ class Evaluation:
 
         named = not (self.table["participant"] == "").any()
         unit = ("participant" if named else "trajectory") if unit is None else unit
-        if unit not in ("participant", "trajectory"):
-            raise ValueError(f"`unit` must be 'participant' or 'trajectory', got {unit!r}")
+        choice("unit", unit, ("participant", "trajectory"))
         if unit == "participant" and not named:
             raise ValueError("some trajectories name no participant; use unit='trajectory'")
-        if not 0 < level < 1:
-            raise ValueError(f"`level` must be between 0 and 1, got {level!r}")
+        level = real("level", level, 0, 1, closed="neither")
         rows = []
         for labels, part in self._per_trajectory().groupby([*self.keys, "fraction"], sort=False):
             units, names = pd.factorize(part[unit])

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import Trajectory
+from legible_envs.support.validation import choice, integer, real
 
 __all__ = ["Groups", "Split", "check_learnable", "folds", "nested_training_sets"]
 
@@ -44,12 +45,10 @@ def folds(
     from sklearn.model_selection import StratifiedGroupKFold, StratifiedKFold
 
     goals = check_learnable(trajectories)
-    if isinstance(cv, bool) or not isinstance(cv, int | np.integer) or cv < 2:
-        raise ValueError(f"`cv` must be a number of folds >= 2, got {cv!r}")
+    cv = integer("cv", cv, 2, unit="folds")
     if len(trajectories) < cv:
         raise ValueError(f"{cv} folds need at least {cv} trajectories, got {len(trajectories)}")
-    if rare not in ("error", "keep"):
-        raise ValueError(f"`rare` must be 'error' or 'keep', got {rare!r}")
+    choice("rare", rare, ("error", "keep"))
     few = {goal: count for goal, count in sorted(Counter(goals).items()) if count < cv}
     if few and rare == "error":
         raise ValueError(
@@ -143,8 +142,7 @@ def nested_training_sets(
     from sklearn.model_selection import GroupShuffleSplit
 
     goals = np.array(check_learnable(trajectories))
-    if not 0 < test_share < 1:
-        raise ValueError(f"`test_share` must be between 0 and 1, got {test_share!r}")
+    test_share = real("test_share", test_share, 0, 1, closed="neither")
     order = rng.permutation(len(trajectories))
     if groups is None:
         place = np.empty(len(trajectories))

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import Trajectory
+from legible_envs.support.validation import integer, real
 from predictors.grid.nearest_kernels import votes_of_nearest
 from predictors.grid.prefixes import PrefixEncoder, PrefixPredictor, Steps, distinct_prefixes
 
@@ -35,7 +36,7 @@ class GridNeighbours(PrefixPredictor):
         self.k = k
 
     def _check_parameters(self) -> None:
-        _check_count("k", self.k)
+        integer("k", self.k, 1)
 
     def _learn(self, trajectories: Sequence[Trajectory]) -> None:
         self._encoder = PrefixEncoder(trajectories, self.classes_)
@@ -73,8 +74,8 @@ class GridNGram(PrefixPredictor):
         self.strength = strength
 
     def _check_parameters(self) -> None:
-        _check_count("n", self.n)
-        _check_positive("strength", self.strength)
+        integer("n", self.n, 1)
+        real("strength", self.strength, 0, closed="neither")
 
     def _contexts(self, trajectory: Trajectory, cells: Steps) -> Iterator[tuple[object, ...]]:
         """The last 1, 2, … n steps."""
@@ -130,8 +131,8 @@ class GridLogistic(PrefixPredictor):
         self.max_iter = max_iter
 
     def _check_parameters(self) -> None:
-        _check_positive("C", self.C)
-        _check_positive("max_iter", self.max_iter)
+        real("C", self.C, 0, closed="neither")
+        real("max_iter", self.max_iter, 0, closed="neither")
 
     def _learn(self, trajectories: Sequence[Trajectory]) -> None:
         from sklearn.linear_model import LogisticRegression
@@ -158,13 +159,3 @@ class GridLogistic(PrefixPredictor):
         scores = self.coef_ @ self._encoder.encode(trajectory, cells) + self.intercept_
         weights = np.exp(scores - scores.max())
         return self._trust * weights / weights.sum() + (1 - self._trust) * self._prior_weights
-
-
-def _check_count(name: str, value: int) -> None:
-    if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-        raise ValueError(f"`{name}` must be an integer >= 1, got {value!r}")
-
-
-def _check_positive(name: str, value: float) -> None:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < np.inf:
-        raise ValueError(f"`{name}` must be a finite number above 0, got {value!r}")

@@ -11,6 +11,7 @@ from sklearn.base import clone
 
 from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.rollouts.trajectory import Trajectory
+from legible_envs.support.validation import choice, real
 from predictors.grid.base import GridPredictor, check_complete, goal_posterior, remaining_steps
 from predictors.grid.graphs import soft_costs, station_costs, walk_graph
 from predictors.grid.maxent_irl import MaxEntIRL
@@ -109,12 +110,9 @@ class BayesianGoalPredictor(GridPredictor):
         if beta == "fit":
             if not isinstance(self.cell_costs, str) or self.cell_costs != "uniform":
                 raise ValueError("`beta='fit'` goes with uniform costs; learned costs are in nats: leave `beta` at 1")
-        elif beta is not None and (
-            isinstance(beta, bool) or not isinstance(beta, int | float) or not 0 <= beta < np.inf
-        ):
-            raise ValueError(f"`beta` must be a finite number >= 0, 'fit' or None, got {beta!r}")
-        if self.costs not in ("hard", "soft"):
-            raise ValueError(f"`costs` must be 'hard' or 'soft', got {self.costs!r}")
+        elif beta is not None:
+            real("beta", beta, 0, also="None, 'fit'")
+        choice("costs", self.costs, ("hard", "soft"))
         if isinstance(self.cell_costs, str) and self.cell_costs not in ("uniform", "learned"):
             raise ValueError(
                 f"`cell_costs` must be 'uniform', 'learned', a MaxEntIRL or an (H, W) array, got {self.cell_costs!r}"

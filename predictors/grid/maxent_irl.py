@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.rollouts.trajectory import Trajectory
+from legible_envs.support.validation import real
 from predictors.base import check_trajectories
 from predictors.grid.base import GridPredictor, check_complete, goal_posterior
 from predictors.grid.graphs import soft_costs
@@ -164,9 +165,7 @@ class MaxEntIRL(GridPredictor):
         if isinstance(self.features, str) and self.features != "position":
             raise ValueError(f"`features` must be 'position', an array or a function, got {self.features!r}")
         for name, least in (("l2", 0.0), ("tol", 0.0), ("max_iter", 0)):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int | float) or not least < value < np.inf:
-                raise ValueError(f"`{name}` must be a finite number above {least:g}, got {value!r}")
+            real(name, getattr(self, name), least, closed="neither")
 
     def _feature_map(self) -> FeatureMap:
         if callable(self.features):

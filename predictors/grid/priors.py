@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import Trajectory
+from legible_envs.support.validation import choice
 
 __all__ = ["PRIORS", "GoalPrior", "Prior"]
 
@@ -34,8 +35,7 @@ class GoalPrior:
     """
 
     def __init__(self, kind: Prior, trajectories: Sequence[Trajectory], classes: npt.NDArray[np.str_]) -> None:
-        if kind not in PRIORS:
-            raise ValueError(f"`prior` must be one of {PRIORS}, got {kind!r}")
+        choice("prior", kind, PRIORS)
         self._rates: dict[str, float] = {}
         if kind == "empirical":
             known = [trajectory for trajectory in trajectories if trajectory.goal is not None]

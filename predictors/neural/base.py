@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import Cut, Trajectory
 from legible_envs.support.files import write_npz
+from legible_envs.support.validation import integer, real
 from predictors.base import FRACTIONS, GoalPredictor, GoalStream, check_trajectories
 from predictors.grid.base import check_trajectory
 from predictors.neural.encoding import Encoding
@@ -228,16 +229,11 @@ class NeuralPredictor(GoalPredictor):
 
     def _settings(self) -> Training:
         for name in (*self._sizes, "members", "batch_size", "max_epochs", "patience"):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-                raise ValueError(f"`{name}` must be a whole number >= 1, got {value!r}")
+            integer(name, getattr(self, name), 1)
         limits = {"learning_rate": 10.0, "weight_decay": 10.0, "dropout": 0.99, "validation_fraction": 0.5}
         for name, most in limits.items():
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= most:
-                raise ValueError(f"`{name}` must be a number from 0 to {most:g}, got {value!r}")
-        if isinstance(self.random_state, bool) or not isinstance(self.random_state, int) or self.random_state < 0:
-            raise ValueError(f"`random_state` must be a whole number >= 0, got {self.random_state!r}")
+            real(name, getattr(self, name), 0, most)
+        integer("random_state", self.random_state, 0, np.inf)
         return Training(
             members=self.members,
             learning_rate=self.learning_rate,

@@ -14,6 +14,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
 from legible_envs.rollouts.trajectory import Cut, Trajectory
+from legible_envs.support.validation import choice, integer, real
 from predictors.base import FRACTIONS, GoalPredictor, check_trajectories
 from predictors.reaching.features import Reach, check_dimension, check_reaches
 
@@ -123,12 +124,9 @@ class ReachLogistic(_MomentClassifier):
         self.max_iter = max_iter
 
     def _make(self, moments: int) -> Any:
-        if self.degree not in (1, 2):
-            raise ValueError(f"`degree` must be 1 or 2, got {self.degree!r}")
-        if not 0 < self.C < np.inf:
-            raise ValueError(f"`C` must be a finite number > 0, got {self.C!r}")
-        if isinstance(self.max_iter, bool) or not isinstance(self.max_iter, int) or self.max_iter < 1:
-            raise ValueError(f"`max_iter` must be an integer >= 1, got {self.max_iter!r}")
+        choice("degree", self.degree, (1, 2))
+        real("C", self.C, 0, closed="neither")
+        integer("max_iter", self.max_iter, 1)
         expand = PolynomialFeatures(self.degree, include_bias=False)
         return make_pipeline(StandardScaler(), expand, LogisticRegression(C=self.C, max_iter=self.max_iter))
 
@@ -151,9 +149,7 @@ class ReachNeighbours(_MomentClassifier):
         self.n_neighbors = n_neighbors
 
     def _make(self, moments: int) -> Any:
-        if isinstance(self.n_neighbors, bool) or not isinstance(self.n_neighbors, int) or self.n_neighbors < 1:
-            raise ValueError(f"`n_neighbors` must be an integer >= 1, got {self.n_neighbors!r}")
-        self.n_neighbors_ = min(self.n_neighbors, moments)
+        self.n_neighbors_ = min(integer("n_neighbors", self.n_neighbors, 1), moments)
         return make_pipeline(StandardScaler(), KNeighborsClassifier(self.n_neighbors_))
 
     def _smoothed(self, weights: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import Trajectory
+from legible_envs.support.validation import real
 from legible_envs.tabletop.layout import TabletopLayout
 from predictors.reaching.base import PlacePredictor, straight_lines
 
@@ -54,8 +55,7 @@ class StraightLineBayesian(PlacePredictor):
         return super().fit(X, y)
 
     def _check_beta(self) -> None:
-        if isinstance(self.beta, bool) or not isinstance(self.beta, int | float) or not 0 <= self.beta < np.inf:
-            raise ValueError(f"`beta` must be a finite number >= 0, got {self.beta!r}")
+        real("beta", self.beta, 0)
 
     def weigh_trajectory(self, trajectory: Trajectory) -> npt.NDArray[np.float64]:
         """See :meth:`PlacePredictor.weigh_trajectory`.

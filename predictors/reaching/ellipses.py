@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 import numpy.typing as npt
 
+from legible_envs.support.validation import integer, real
+
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -82,8 +84,7 @@ def ellipse_table(gaussian: TimeSeriesGaussian, *, deviations: float = 2.0, ever
 
     if gaussian.n_dims_ != 2:
         raise ValueError(f"ellipses need reaches in the plane, these have dimension {gaussian.n_dims_}")
-    if not 0 < deviations < np.inf or every < 1:
-        raise ValueError(f"`deviations` must be > 0 and `every` >= 1, got {deviations!r} and {every!r}")
+    deviations, every = real("deviations", deviations, 0, closed="neither"), integer("every", every, 1)
     last = gaussian.n_samples - 1
     chosen = np.unique(np.r_[np.arange(0, last, every), last])
     values, axes = np.linalg.eigh(gaussian.covariances_[:, chosen, :2, :2])
@@ -124,8 +125,7 @@ def draw_reaches(
     """
     from PIL import Image, ImageDraw
 
-    if size < 16:
-        raise ValueError(f"`size` must be at least 16 pixels, got {size!r}")
+    size = integer("size", size, 16, unit="pixels")
     table = ellipse_table(gaussian, deviations=deviations, every=every)
     turn = np.linspace(0.0, 2 * np.pi, 49)
     along, across = table["major"].to_numpy()[:, None] * np.cos(turn), table["minor"].to_numpy()[:, None] * np.sin(turn)

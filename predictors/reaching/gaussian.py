@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import Cut, Trajectory
+from legible_envs.support.validation import choice, integer, real
 from predictors.base import FRACTIONS, GoalPredictor, GoalStream, check_trajectories
 from predictors.reaching.alignment_kernels import dba_step, match_means, pairwise_costs
 from predictors.reaching.features import Reach, check_dimension, check_reaches, resample
@@ -157,21 +158,15 @@ class TimeSeriesGaussian(GoalPredictor):
         return -1 if self.band is None else int(self.band * self.n_samples)
 
     def _check_parameters(self) -> None:
-        if not isinstance(self.n_samples, int) or isinstance(self.n_samples, bool) or self.n_samples < 2:
-            raise ValueError(f"`n_samples` must be an integer >= 2, got {self.n_samples!r}")
-        for name, kinds in (
-            ("alignment", ("none", "mean", "medoid", "dba")),
-            ("online", ("open-end", "index", "fraction")),
-        ):
-            if getattr(self, name) not in kinds:
-                raise ValueError(f"`{name}` must be one of {kinds}, got {getattr(self, name)!r}")
-        if self.band is not None and not 0 <= self.band <= 1:
-            raise ValueError(f"`band` must be None or a share from 0 to 1, got {self.band!r}")
-        for name in ("floor", "velocity_floor"):
-            if not 0 < getattr(self, name) < np.inf:
-                raise ValueError(f"`{name}` must be a finite number > 0, got {getattr(self, name)!r}")
-        if self.half_life is not None and not 0 <= self.half_life < np.inf:
-            raise ValueError(f"`half_life` must be None or a finite number >= 0, got {self.half_life!r}")
+        integer("n_samples", self.n_samples, 2)
+        choice("alignment", self.alignment, ("none", "mean", "medoid", "dba"))
+        choice("online", self.online, ("open-end", "index", "fraction"))
+        if self.band is not None:
+            real("band", self.band, 0, 1, also="None")
+        real("floor", self.floor, 0, closed="neither")
+        real("velocity_floor", self.velocity_floor, 0, closed="neither")
+        if self.half_life is not None:
+            real("half_life", self.half_life, 0, also="None")
 
     # -- predicting ---------------------------------------------------------------------------------------------------
 

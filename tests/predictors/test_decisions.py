@@ -139,7 +139,7 @@ def test_bad_rules_and_points() -> None:
     walk = example_trajectories()[0]
     predictor = ShortestDistance().fit([walk])
     for threshold in (0, 1.1, math.nan, True, "high"):
-        with pytest.raises(ValueError, match="a threshold must be above 0 and at most 1"):
+        with pytest.raises(ValueError, match="`threshold` must be a finite number > 0 and <= 1"):
             ThresholdDecision(predictor, threshold)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="`patience`"):
         ThresholdDecision(predictor, patience=0)

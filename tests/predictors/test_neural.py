@@ -340,7 +340,7 @@ for name in {names}:
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
-        ({"hidden_size": 0}, "`hidden_size` must be a whole number"),
+        ({"hidden_size": 0}, "`hidden_size` must be an integer >= 1"),
         ({"members": 1.5}, "`members`"),
         ({"dropout": 1.0}, "`dropout`"),
         ({"learning_rate": -1}, "`learning_rate`"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -18,8 +19,10 @@ from legible_envs.overcooked.layout import (
     STATION_CODES,
     STATION_TYPES,
     OvercookedLayout,
+    check_shape,
 )
 from legible_envs.overcooked.scoring.genome_kernels import Geometry
+from legible_envs.support.validation import entries, flag, integer, shown
 
 __all__ = ["DesignRules"]
 
@@ -45,7 +48,7 @@ class DesignRules:
         forbidden: Iterable[Cell],
         distinct_access: bool,
     ) -> None:
-        self.shape = self._checked_shape(shape)
+        self.shape = check_shape(shape, partial(LayoutError, rule="shape"))
         rows, cols = self.shape
         top = [(0, c) for c in range(1, cols - 1)]
         right = [(r, cols - 1) for r in range(1, rows - 1)]
@@ -61,7 +64,7 @@ class DesignRules:
         self.slot_access: list[Cell] = [(min(max(r, 1), rows - 2), min(max(c, 1), cols - 2)) for r, c in self.slots]
         self.inner: list[Cell] = [(r, c) for r in range(1, rows - 1) for c in range(1, cols - 1)]
         self.stations = self._checked_stations(stations)
-        self.distinct_access = bool(distinct_access)
+        self.distinct_access = flag("distinct_access", distinct_access)
         self.forbidden = self._checked_forbidden(forbidden)
         self.locked = self._checked_locked(locked)
         self._slot_of = {cell: slot for slot, cell in enumerate(self.slots)}
@@ -70,27 +73,20 @@ class DesignRules:
     # -- checking the arguments ------------------------------------------------------------------------------------
 
     @staticmethod
-    def _checked_shape(shape: Sequence[int]) -> tuple[int, int]:
-        try:
-            rows, cols = (int(side) for side in shape)
-        except (TypeError, ValueError) as error:
-            raise LayoutError(f"shape must be (rows, columns), got {shape!r}", rule="shape") from error
-        if rows < 3 or cols < 3:
-            raise LayoutError(f"both sides of a kitchen need at least 3 cells, got {(rows, cols)}", rule="shape")
-        return rows, cols
-
-    @staticmethod
     def _checked_stations(stations: Sequence[str]) -> tuple[str, ...]:
-        unknown = [s for s in stations if s not in STATION_TYPES]
-        if isinstance(stations, str) or unknown or len(set(stations)) != len(stations) or len(stations) < 2:
+        names = tuple(entries(stations))
+        are_types = all(isinstance(name, str) and name in STATION_TYPES for name in names)
+        if not are_types or len(set(names)) != len(names) or len(names) < 2:
             raise LayoutError(
-                f"stations must be at least two different ones of {list(STATION_TYPES)}, got {stations!r}",
+                f"`stations` must be at least two different ones of {list(STATION_TYPES)}, got {shown(stations)}",
                 rule="station",
             )
-        return tuple(stations)
+        return names
 
     def _checked_forbidden(self, forbidden: Iterable[Cell]) -> tuple[Cell, ...]:
-        cells = tuple(sorted({(int(r), int(c)) for r, c in forbidden}))
+        if not isinstance(forbidden, Iterable) or isinstance(forbidden, str | Mapping):
+            raise LayoutError(f"`forbidden` must be cells (row, column), got {shown(forbidden)}", rule="forbidden")
+        cells = tuple(sorted({_read_cell("forbidden", cell) for cell in forbidden}))
         for cell in cells:
             if cell not in self.slots and cell not in self.inner:
                 raise LayoutError(
@@ -106,7 +102,7 @@ class DesignRules:
         for name, cell in locked.items():
             if name not in self.stations:
                 raise LayoutError(f"cannot lock {name!r}; the stations are {list(self.stations)}", rule="locked")
-            row, col = (int(i) for i in cell)
+            row, col = _read_cell("locked", cell)
             if (row, col) not in self.slots or (row, col) in self.forbidden:
                 raise LayoutError(
                     f"cannot lock {name!r} at row {row}, column {col}: stations stand on border cells that are neither "
@@ -286,3 +282,17 @@ class DesignRules:
             raise LayoutError(f"the layout has no {', '.join(missing)} station", rule="station")
         self.check(genome)
         return genome
+
+
+def _read_cell(name: str, cell: object) -> Cell:
+    """The row and column of a cell in an argument.
+
+    Raises:
+        LayoutError: Not two whole numbers; its ``rule`` is the argument's name.
+    """
+    error = partial(LayoutError, rule=name)
+    numbers = entries(cell)
+    if len(numbers) != 2:
+        raise error(f"each cell in `{name}` must be (row, column), got {shown(cell)}")
+    row, col = (integer(f"a row or column in `{name}`", i, whole_floats=True, error=error) for i in numbers)
+    return row, col

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from legible_envs.errors import LayoutError
+from legible_envs.errors import LayoutError, TaskError
 from legible_envs.observer import ObserverModel, Ties, check_prefix
 from legible_envs.overcooked.design import genome_kernels as kernels
 from legible_envs.overcooked.design.keys import KitchenKeys
@@ -23,9 +23,9 @@ from legible_envs.overcooked.scoring.boltzmann import HumanModel, HumanName
 from legible_envs.overcooked.scoring.genome_kernels import score_genomes, valid_genomes
 from legible_envs.overcooked.scoring.scorer import OvercookedScorer
 from legible_envs.overcooked.scoring.tables import make_tables
-from legible_envs.support.validation import check_costs, check_finite
+from legible_envs.support.validation import choice, entries, integer, real, shown
 from legible_envs.tasks import TaskGraph
-from legible_envs.workspace import Array, Workspace, as_batch, as_single, check_choice
+from legible_envs.workspace import Array, Workspace, as_batch, as_single
 
 if TYPE_CHECKING:
     from legible_envs.rollouts.trajectory import Trajectory
@@ -119,12 +119,18 @@ class OvercookedWorkspace(Workspace):
         cell_costs: npt.ArrayLike | None = None,
     ) -> None:
         observer = ObserverModel(beta, c, check_prefix(prefix), ties, tie_tolerance)
-        self.relocation_cost = check_finite("relocation_cost", relocation_cost, minimum=0.0)
+        self.relocation_cost = real("relocation_cost", relocation_cost, 0)
         self.recipes = check_recipes(recipes)
-        self.pots = pots
+        self.pots = None if pots is None else integer("pots", pots, 1, also="None", error=TaskError)
         self._custom_task = TaskGraph.from_dict(task) if isinstance(task, Mapping) else task
+        if not isinstance(self._custom_task, TaskGraph | None):
+            raise TaskError(f"`task` must be None, a TaskGraph or its to_dict(), got {shown(task)}")
         self.task = self._custom_task or soup_task(self.recipes, pots)
         self.start_from = OvercookedLayout.from_ascii(start_from) if isinstance(start_from, str) else start_from
+        if not isinstance(self.start_from, OvercookedLayout | None):
+            raise LayoutError(
+                f"`start_from` must be None, an OvercookedLayout or a drawing, got {shown(start_from)}", rule="type"
+            )
         self.rules = DesignRules(
             shape,
             stations,
@@ -138,16 +144,17 @@ class OvercookedWorkspace(Workspace):
         self.human, self.rationality, self.horizon = people.name, people.rationality, people.horizon
         longest = max(len(self.rules.inner), self.horizon or 0)
         self._tables = make_tables(self.task, self.stations, observer, num_floor=longest)
-        self.cell_costs = check_costs(cell_costs, self.shape, observer.tie_tolerance)
+        self.cell_costs = _checked_costs(cell_costs, self.shape, observer.tie_tolerance)
         self.scorer = OvercookedScorer(self.task, observer=observer, human=people, cell_costs=self.cell_costs)
         self._home = None if self.start_from is None else self.rules.encode(self.start_from)
 
     def _locked_cells(self, locked: Mapping[str, Cell] | Sequence[str] | None) -> dict[str, Cell]:
         if locked is None or isinstance(locked, Mapping):
             return dict(locked or {})
-        if isinstance(locked, str) or self.start_from is None:
+        if isinstance(locked, str) or not isinstance(locked, Iterable) or self.start_from is None:
             raise LayoutError(
-                f"locked={locked!r}: give {{station: (row, col)}}, or a list of names together with start_from",
+                f"`locked` must be {{station: (row, col)}}, or a list of names together with start_from, got "
+                f"{shown(locked)}",
                 rule="locked",
             )
         missing = [name for name in locked if name not in self.start_from.stations]
@@ -158,10 +165,11 @@ class OvercookedWorkspace(Workspace):
     def _checked_ranked(self, ranked: Sequence[str] | str | None) -> tuple[str, ...]:
         if ranked is None:
             ranked = [name for name in self.stations if name in INGREDIENTS] or self.stations
-        names = self.stations if ranked == "all" else tuple(ranked)
-        if not names or len(set(names)) != len(names) or any(name not in self.stations for name in names):
-            raise ValueError(f"ranked must be 'all' or different ones of {list(self.stations)}, got {ranked!r}")
-        return tuple(names)
+        names = self.stations if isinstance(ranked, str) and ranked == "all" else tuple(entries(ranked))
+        are_stations = all(isinstance(name, str) and name in self.stations for name in names)
+        if not names or not are_stations or len(set(names)) != len(names):
+            raise ValueError(f"`ranked` must be 'all' or different ones of {list(self.stations)}, got {shown(ranked)}")
+        return names
 
     # -- genomes ---------------------------------------------------------------------------------------------------
 
@@ -199,8 +207,7 @@ class OvercookedWorkspace(Workspace):
         Raises:
             LayoutError: Two million draws in a row broke a rule: the rules leave (almost) no room.
         """
-        if not 0 <= obstacle_rate <= 1:
-            raise ValueError(f"obstacle_rate must be in [0, 1], got {obstacle_rate!r}")
+        obstacle_rate = real("obstacle_rate", obstacle_rate, 0, 1)
         genomes = np.zeros((n, self.genome_size), dtype=np.int8)
         first = 0
         if self._home is not None and n:
@@ -222,7 +229,7 @@ class OvercookedWorkspace(Workspace):
         Each child differs by one change: a station moved to a free counter, two stations swapped, an obstacle added,
         or one removed. A parent that has no valid child repeats itself.
         """
-        check_choice("phase", phase, range(self.phases))
+        choice("phase", phase, range(self.phases))
         parents, valid = self._as_int8(genomes)
         if not (valid & self.valid(parents)).all():
             self.decode(np.asarray(genomes)[int(np.argmin(valid & self.valid(parents)))])
@@ -411,3 +418,28 @@ class OvercookedWorkspace(Workspace):
         from legible_envs.workspace import make_workspace
 
         return make_workspace, (self.to_config(),)
+
+
+def _checked_costs(
+    cell_costs: npt.ArrayLike | None, shape: tuple[int, int], tie_tolerance: float
+) -> npt.NDArray[np.float64] | None:
+    """A read-only ``(H, W)`` copy of the costs of stepping on each cell, or None.
+
+    Raises:
+        ValueError: No numbers, another shape, or inner cells whose costs are not finite, not positive, or lost in the
+            tolerance.
+    """
+    if cell_costs is None:
+        return None
+    try:
+        costs = np.array(cell_costs, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ValueError(f"`cell_costs` must be an array of numbers of shape {shape}: {error}") from error
+    if costs.shape != shape:
+        raise ValueError(f"`cell_costs` must have shape {shape}, got {costs.shape}")
+    inner = costs[1:-1, 1:-1]
+    least = max(1e-6, 2 * tie_tolerance)
+    if not np.isfinite(inner).all() or inner.min() < least:
+        raise ValueError(f"`cell_costs` of inner cells must be finite and at least {least:g}, got {inner.min():g}")
+    costs.setflags(write=False)
+    return costs

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from legible_envs.errors import LayoutError
 from legible_envs.overcooked.layout import INGREDIENTS, OvercookedLayout
 from legible_envs.overcooked.recipes import PAPER_SOUPS, Recipe, check_recipes
+from legible_envs.support.validation import integer
 
 __all__ = ["LEGIBLE", "OVERCOOKED_AI_2019", "RULE_SETS", "GameRules", "pack_kitchen", "pack_rules"]
 
@@ -54,9 +55,8 @@ class GameRules:
         for recipe in self.recipes:
             if max(recipe.count(i) for i in recipe) > MAX_COPIES:
                 raise ValueError(f"a recipe may use an ingredient at most {MAX_COPIES} times, got {recipe}")
-        if isinstance(self.cook_time, bool) or not 0 <= int(self.cook_time) <= 10_000:
-            raise ValueError(f"`cook_time` must be 0 to 10,000 ticks, got {self.cook_time!r}")
-        object.__setattr__(self, "cook_time", int(self.cook_time))
+        cook_time = integer("cook_time", self.cook_time, 0, 10_000, whole_floats=True, unit="ticks")
+        object.__setattr__(self, "cook_time", cook_time)
 
 
 LEGIBLE: Final = GameRules()

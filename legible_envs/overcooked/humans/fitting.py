@@ -14,6 +14,7 @@ from legible_envs.overcooked.grid_kernels import costs_to, neighbour
 from legible_envs.overcooked.humans.kernels import GoalField, is_option
 from legible_envs.overcooked.layout import FLOOR, OvercookedLayout
 from legible_envs.rollouts.trajectory import Trajectory
+from legible_envs.support.validation import real
 
 __all__ = ["RationalityFit", "RationalitySpread", "fit_rationality", "goal_field", "rationality_spread"]
 
@@ -120,8 +121,7 @@ def fit_rationality(
         0.347
     """
     listed = list(trajectories)
-    if not 0 < confidence < 1:
-        raise ValueError(f"`confidence` must be in (0, 1), got {confidence!r}")
+    confidence = real("confidence", confidence, 0, 1, closed="neither")
     names = sorted({trajectory.participant for trajectory in listed})
     steps = _collect(listed, names, cell_costs)
     return _fit(steps, confidence, len(listed), len(names))

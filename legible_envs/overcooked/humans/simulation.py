@@ -33,7 +33,7 @@ from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.overcooked.recipes import soup_task
 from legible_envs.overcooked.scoring.boltzmann import DEFAULT_RATIONALITY
 from legible_envs.rollouts.trajectory import Trajectory
-from legible_envs.support.validation import check_finite
+from legible_envs.support.validation import integer, real
 from legible_envs.tasks import TaskGraph
 
 __all__ = [
@@ -74,7 +74,7 @@ class BoltzmannWalker(Walker):
 
     def __init__(self, rationality: float = DEFAULT_RATIONALITY, **arguments: Any) -> None:
         super().__init__(**arguments)
-        self.rationality = check_finite("rationality", rationality, minimum=0.0)
+        self.rationality = real("rationality", rationality, 0)
 
     @property
     def params(self) -> Floats:
@@ -106,9 +106,7 @@ class BoltzmannWalker(Walker):
             preference: Standard deviation of the log cost of each cell; 0 for a person without preferences.
             **arguments: Of every :class:`Walker`: ``idle``, ``turn``, ``tick``.
         """
-        own = check_finite("rationality", rationality, 0.0) * math.exp(
-            check_finite("spread", spread, 0.0) * rng.normal()
-        )
+        own = real("rationality", rationality, 0) * math.exp(real("spread", spread, 0) * rng.normal())
         return cls(own, preferences=draw_preferences(shape, rng, preference), **arguments)
 
 
@@ -143,15 +141,11 @@ class PlannerWalker(Walker):
         **arguments: Any,
     ) -> None:
         super().__init__(**arguments)
-        if isinstance(depth, bool) or not isinstance(depth, int | np.integer) or not 1 <= depth <= 6:
-            raise ValueError(f"depth must be an integer from 1 to 6, got {depth!r}")
-        self.depth = int(depth)
-        self.turn_cost = check_finite("turn_cost", turn_cost, minimum=0.0)
-        self.recency = check_finite("recency", recency, minimum=0.0)
-        self.fade = check_finite("fade", fade, minimum=0.0)
-        self.slip = check_finite("slip", slip, minimum=0.0)
-        if self.fade >= 1 or self.slip > 1:
-            raise ValueError(f"fade must be in [0, 1) and slip in [0, 1], got {fade!r} and {slip!r}")
+        self.depth = integer("depth", depth, 1, 6)
+        self.turn_cost = real("turn_cost", turn_cost, 0)
+        self.recency = real("recency", recency, 0)
+        self.fade = real("fade", fade, 0, 1, closed="left")
+        self.slip = real("slip", slip, 0, 1)
 
     @property
     def params(self) -> Floats:
@@ -221,11 +215,12 @@ def simulate_participants(
 
     Raises:
         LayoutError: The task cannot be done in this kitchen.
-        ValueError: Unknown population.
+        ValueError: Unknown population, or a number out of range.
     """
     task = task or soup_task()
     if population is None:
         population = "boltzmann"
+    n, executions = integer("n", n, 0), integer("executions", executions, 0)
     if isinstance(population, str) and population not in _POPULATIONS:
         raise ValueError(f"`population` must be one of {list(_POPULATIONS)} or a callable, got {population!r}")
     draw = _POPULATIONS[population] if isinstance(population, str) else population

@@ -17,7 +17,7 @@ from legible_envs.overcooked.humans.fitting import goal_field
 from legible_envs.overcooked.humans.kernels import GoalField, sample_times, sample_walk
 from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.rollouts.trajectory import Trajectory
-from legible_envs.support.validation import check_finite
+from legible_envs.support.validation import real
 
 __all__ = ["Walker", "draw_one", "draw_preferences", "in_reach"]
 
@@ -50,9 +50,9 @@ class Walker(ABC):
         turn: float = 0.05,
         tick: float = 0.15,
     ) -> None:
-        self.idle = check_finite("idle", idle, minimum=0.0)
-        self.turn = check_finite("turn", turn, minimum=0.0)
-        self.tick = check_finite("tick", tick, minimum=0.0)
+        self.idle = real("idle", idle, 0)
+        self.turn = real("turn", turn, 0)
+        self.tick = real("tick", tick, 0)
         if self.idle + self.turn >= 1:
             raise ValueError(f"idle + turn must be less than 1, got {idle!r} + {turn!r}: the person would never move")
         self.preferences = None if preferences is None else np.array(preferences, dtype=np.float64)
@@ -223,7 +223,7 @@ def in_reach(layout: OvercookedLayout, cell: Cell, kind: str) -> list[str]:
 
 def draw_preferences(shape: tuple[int, int], rng: np.random.Generator, preference: float) -> Floats | None:
     """``(H, W)`` lognormal costs around 1, None for a person without preferences."""
-    sd = check_finite("preference", preference, minimum=0.0)
+    sd = real("preference", preference, 0)
     return None if sd == 0 else np.exp(sd * rng.normal(size=shape))
 
 

@@ -40,6 +40,7 @@ from legible_envs.legibility import (
     tied_goals,
 )
 from legible_envs.observer import ObserverModel, PrefixSpec
+from legible_envs.support.validation import choice, integer, real
 
 __all__ = [
     "DEFAULT_RATIONALITY",
@@ -77,18 +78,14 @@ class HumanModel:
     horizon: int | None = None
 
     def __post_init__(self) -> None:
-        if self.name not in get_args(HumanName):
-            raise ValueError(f"human must be one of {list(get_args(HumanName))}, got {self.name!r}")
+        choice("human", self.name, get_args(HumanName))
         if self.name == "shortest":
-            given = [key for key in ("rationality", "horizon") if getattr(self, key) is not None]
+            given = [f"`{key}`" for key in ("rationality", "horizon") if getattr(self, key) is not None]
             if given:
                 raise ValueError(f"{' and '.join(given)} belong to human='boltzmann', got human='shortest'")
             return
         rationality = DEFAULT_RATIONALITY if self.rationality is None else self.rationality
-        is_number = isinstance(rationality, int | float | np.number) and not isinstance(rationality, bool)
-        if not is_number or not 0 < rationality < math.inf:
-            raise ValueError(f"rationality must be a finite number > 0, got {rationality!r}")
-        object.__setattr__(self, "rationality", float(rationality))
+        object.__setattr__(self, "rationality", real("rationality", rationality, 0, closed="neither"))
 
     def within(self, num_floor: int) -> HumanModel:
         """The same model with a horizon that suits kitchens of at most ``num_floor`` floor cells.
@@ -103,12 +100,8 @@ class HumanModel:
             return self
         longest = num_floor + 1
         horizon = 2 * longest if self.horizon is None else self.horizon
-        if isinstance(horizon, bool) or not isinstance(horizon, int | np.integer) or horizon < longest:
-            raise ValueError(
-                f"horizon must be an integer of at least {longest} steps, the length of the longest conceivable "
-                f"shortest trajectory through {num_floor} cells; got {horizon!r}"
-            )
-        return HumanModel(self.name, self.rationality, int(horizon))
+        unit = f"steps, the length of the longest conceivable shortest trajectory through {num_floor} cells"
+        return HumanModel(self.name, self.rationality, integer("horizon", horizon, longest, also="None", unit=unit))
 
 
 def step_probabilities(

@@ -16,10 +16,11 @@ from typing import TYPE_CHECKING, Any, get_args
 import numpy as np
 import numpy.typing as npt
 
+from legible_envs.support.validation import choice
 from legible_envs.tabletop.scoring.exact_kernels import ReachTables
 from legible_envs.tabletop.scoring.scorer import TabletopScorer
 from legible_envs.tabletop.task import TabletopTask
-from legible_envs.workspace import ObjectiveName, check_choice
+from legible_envs.workspace import ObjectiveName
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -202,7 +203,7 @@ def genome_gradients(workspace: TabletopWorkspace, genomes: Floats, objective: O
         raise ValueError(
             "the rank of an order has no gradient; give the workspace condition='placement' and second_measure='mean x'"
         )
-    check_choice("objective", objective, get_args(ObjectiveName))
+    choice("objective", objective, get_args(ObjectiveName))
     table = DifferentiableTable(workspace.scorer, ranked=workspace.ranked)
     movable = table.home.size
     centres = genomes[:, :movable].reshape(len(genomes), *table.home.shape)

@@ -11,10 +11,10 @@ from typing import Any, ClassVar, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from legible_envs.errors import LayoutError
+from legible_envs.errors import LayoutError, TaskError
 from legible_envs.observer import ObserverModel, Ties
 from legible_envs.rollouts.trajectory import Trajectory
-from legible_envs.support.validation import check_finite
+from legible_envs.support.validation import choice, entries, flag, real, shown
 from legible_envs.tabletop.design import genome_kernels as kernels
 from legible_envs.tabletop.design import measures
 from legible_envs.tabletop.design import validity_kernels as validity
@@ -24,7 +24,7 @@ from legible_envs.tabletop.objects import OBSTACLE_SIZE, numbers
 from legible_envs.tabletop.scoring.explanation import summarise
 from legible_envs.tabletop.scoring.scorer import TableScores, TabletopScorer
 from legible_envs.tabletop.task import TabletopTask, task_names
-from legible_envs.workspace import Array, ObjectiveName, Workspace, as_batch, as_single, check_choice
+from legible_envs.workspace import Array, ObjectiveName, Workspace, as_batch, as_single
 
 __all__ = ["DesignMode", "TabletopWorkspace"]
 
@@ -130,41 +130,41 @@ class TabletopWorkspace(Workspace):
             task == self.task.name or _as_task(self.task.name) == self.task
         )
         self._task_config = self.task.name if is_shipped else self.task.to_dict()
-        self.condition: DesignMode = check_choice("condition", condition, get_args(DesignMode))
+        self.condition: DesignMode = choice("condition", condition, get_args(DesignMode))
         self.scorer = TabletopScorer(
             self.task,
             observer=ObserverModel.in_metres(beta, c, prefix, ties, tie_tolerance, unit),
             max_obstacles=max_obstacles,
-            obstacle_size=numbers(obstacle_size, 2, "obstacle_size", positive=True),  # type: ignore[arg-type]
+            obstacle_size=numbers(obstacle_size, 2, "`obstacle_size`", positive=True),  # type: ignore[arg-type]
         )
         if condition != "placement" and max_obstacles == 0:
             raise ValueError(f"condition {condition!r} needs max_obstacles >= 1, got 0")
-        if max_detour is not None and not 1 <= max_detour < np.inf:
-            raise ValueError(f"max_detour must be a finite number >= 1 or None, got {max_detour!r}")
-        if not 0 < step_sd < np.inf:
-            raise ValueError(f"step_sd must be a positive number of metres, got {step_sd!r}")
-        self.obstacle_cost = check_finite("obstacle_cost", obstacle_cost, minimum=0.0)
-        self.step_sd = float(step_sd)
+        if max_detour is not None:
+            real("max_detour", max_detour, 1, also="None")
+        self.obstacle_cost = real("obstacle_cost", obstacle_cost, 0)
+        self.step_sd = real("step_sd", step_sd, 0, closed="neither", unit="metres")
         self.start_from = TabletopLayout.from_dict(start_from) if isinstance(start_from, Mapping) else start_from
         if not isinstance(self.start_from, TabletopLayout | None):
-            raise LayoutError(f"start_from must be a TabletopLayout or its to_dict(), got {start_from!r}", rule="type")
+            raise LayoutError(
+                f"`start_from` must be a TabletopLayout or its to_dict(), got {shown(start_from)}", rule="type"
+            )
         self.rules = DesignRules(
             self.task,
             self.baseline if self.start_from is None else self.start_from,
             moves_objects=condition != "obstacles",
             moves_obstacles=condition != "placement",
-            max_obstacles=max_obstacles,
+            max_obstacles=self.scorer.max_obstacles,
             obstacle_size=self.scorer.obstacle_size,
             max_detour=max_detour,
-            start_clearance=check_finite("start_clearance", start_clearance, minimum=0.0),
-            object_clearance=check_finite("object_clearance", object_clearance, minimum=0.0),
-            object_spacing=check_finite("object_spacing", object_spacing, minimum=0.0),
-            obstacles_on_table=bool(obstacles_on_table),
-            obstacles_apart=bool(obstacles_apart),
+            start_clearance=real("start_clearance", start_clearance, 0),
+            object_clearance=real("object_clearance", object_clearance, 0),
+            object_spacing=real("object_spacing", object_spacing, 0),
+            obstacles_on_table=flag("obstacles_on_table", obstacles_on_table),
+            obstacles_apart=flag("obstacles_apart", obstacles_apart),
         )
         self.ranked = self._checked_ranked(ranked)
         self.phases = 2 if condition == "both" else 1
-        self.second_measure: SecondMeasure = check_choice("second_measure", second_measure, get_args(SecondMeasure))
+        self.second_measure: SecondMeasure = choice("second_measure", second_measure, get_args(SecondMeasure))
         if second_measure == "mean x" and condition != "placement":
             raise ValueError(f"second_measure 'mean x' is for condition 'placement', not {condition!r}")
         self.measure_names = (
@@ -182,10 +182,11 @@ class TabletopWorkspace(Workspace):
         if ranked is None:
             first = {goal for subtask in self.task.graph.subtasks if not subtask.after for goal in subtask.goals}
             ranked = [name for name in movable if name in first] or movable
-        names = tuple(movable) if ranked == "all" else tuple(ranked)
-        if not names or len(set(names)) != len(names) or any(name not in self.task.layout.goals for name in names):
+        names = tuple(movable if isinstance(ranked, str) and ranked == "all" else entries(ranked))
+        are_objects = all(isinstance(name, str) and name in self.task.layout.goals for name in names)
+        if not names or not are_objects or len(set(names)) != len(names):
             raise ValueError(
-                f"ranked must be 'all' or different ones of {list(self.task.layout.goals)}, got {ranked!r}"
+                f"`ranked` must be 'all' or different ones of {list(self.task.layout.goals)}, got {shown(ranked)}"
             )
         return names
 
@@ -258,7 +259,7 @@ class TabletopWorkspace(Workspace):
         Objects vary in phase 0, obstacles in phase 1 (under ``"obstacles"`` in phase 0, the only one);
         :func:`.perturb_genomes` documents the changes. A parent that has no valid child repeats itself.
         """
-        check_choice("phase", phase, range(self.phases))
+        choice("phase", phase, range(self.phases))
         parents = self._as_float(genomes)
         is_valid = self.valid(parents)
         if not is_valid.all():
@@ -491,4 +492,6 @@ def _as_task(task: TabletopTask | Mapping[str, Any] | str) -> TabletopTask:
         return task
     if isinstance(task, Mapping):
         return TabletopTask.from_dict(task)
+    if not isinstance(task, str):
+        raise TaskError(f"`task` must be a TabletopTask, a name, a path or a mapping, got {shown(task)}")
     return TabletopTask.from_yaml(task) if task.endswith((".yaml", ".yml")) else TabletopTask.named(task)

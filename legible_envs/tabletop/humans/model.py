@@ -26,6 +26,7 @@ from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
+from legible_envs.support.validation import entries, is_real, real, shown
 from legible_envs.tabletop.objects import Point
 
 __all__ = ["Person", "ReachModel"]
@@ -82,10 +83,10 @@ class Person:
 
     def __post_init__(self) -> None:
         check_parameters(self, signed=("bow",), skipped=("bow_turns",))
-        turns = tuple(float(value) for value in self.bow_turns)
-        if len(turns) != 4 or not all(map(math.isfinite, turns)):
-            raise ValueError(f"bow_turns must be four finite numbers, got {self.bow_turns!r}")
-        object.__setattr__(self, "bow_turns", turns)
+        turns = entries(self.bow_turns)
+        if len(turns) != 4 or not all(map(is_real, turns)):
+            raise ValueError(f"`bow_turns` must be four finite numbers, got {shown(self.bow_turns)}")
+        object.__setattr__(self, "bow_turns", tuple(map(float, turns)))
         if self.crossing_rate > 1:
             raise ValueError(f"crossing_rate is a probability, at most 1, got {self.crossing_rate!r}")
         if self.skew == 0 or self.drift_time == 0 or self.intercept + self.slope == 0:
@@ -170,9 +171,5 @@ def check_parameters(
         if entry.name in skipped:
             continue
         value = getattr(parameters, entry.name)
-        is_number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool) and math.isfinite(value)
-        if not is_number or (value < 0 and entry.name not in signed):
-            raise ValueError(
-                f"{entry.name} must be a finite number{'' if entry.name in signed else ' >= 0'}, got {value!r}"
-            )
-        object.__setattr__(parameters, entry.name, float(value))
+        least = -math.inf if entry.name in signed else 0
+        object.__setattr__(parameters, entry.name, real(entry.name, value, least))

@@ -22,6 +22,7 @@ import numpy.typing as npt
 
 from legible_envs.errors import LayoutError
 from legible_envs.rollouts.trajectory import Trajectory
+from legible_envs.support.validation import integer, real
 from legible_envs.tabletop.geometry.paths import ShortestPaths
 from legible_envs.tabletop.humans.kernels import LEG, miss_goal, path_length, sample_reach, trace_path
 from legible_envs.tabletop.humans.model import Person, ReachModel
@@ -263,9 +264,7 @@ def simulate_participants(
         LayoutError: The task cannot be done on this table, or no task of the package has its objects.
         ValueError: A number out of range.
     """
-    for name, value in (("n", n), ("executions", executions)):
-        if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 0:
-            raise ValueError(f"{name} must be an integer >= 0, got {value!r}")
+    n, executions = integer("n", n, 0), integer("executions", executions, 0)
     task, rate, surface = _checked_task(task, layout), _checked_rate(rate), Surface(layout)
     found: list[Trajectory] = []
     for number in range(n):
@@ -395,9 +394,7 @@ def _reach(
 
 
 def _checked_rate(rate: float) -> float:
-    if isinstance(rate, bool) or not isinstance(rate, int | float | np.number) or not 0 < rate < math.inf:
-        raise ValueError(f"rate must be a finite number of samples per second above 0, got {rate!r}")
-    return float(rate)
+    return real("rate", rate, 0, closed="neither", unit="samples per second")
 
 
 def _checked_task(task: TabletopTask | None, layout: TabletopLayout) -> TabletopTask:

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.errors import LayoutError
+from legible_envs.support.validation import real
 from legible_envs.tabletop.geometry.paths import ShortestPaths
 from legible_envs.tabletop.partner.belief_kernels import reach_lengths, reach_posterior
 
@@ -76,12 +77,10 @@ class GoalBelief:
         positions: npt.ArrayLike | None = None,
         prior: Mapping[str, float] | None = None,
     ) -> None:
-        if isinstance(beta, bool) or not isinstance(beta, int | float) or not 0 <= beta < math.inf:
-            raise ValueError(f"`beta` must be a finite number >= 0, got {beta!r}")
+        self._beta = real("beta", beta, 0)
         self.goals = layout.goals if goals is None else tuple(goals)
         if not self.goals or len(set(self.goals)) != len(self.goals):
             raise ValueError(f"`goals` must name at least one object, each once, got {self.goals!r}")
-        self._beta = float(beta)
         self._prior = _checked_prior(prior, self.goals)
         paths, rows = _paths_to(layout, self.goals, positions)
         self._tables = _PathTables(paths.boxes, paths.size, paths.corners, paths.goals[rows], paths.tables[rows])

@@ -13,6 +13,7 @@ import numpy as np
 
 from legible_envs.rollouts.trajectory import Trajectory
 from legible_envs.support.plugins import Registry
+from legible_envs.support.validation import shown
 from legible_envs.tabletop.partner.belief import BayesianIntent
 from legible_envs.tabletop.partner.interface import Floats, GoalStream, PrefixPredictor, Senses, StreamingPredictor
 
@@ -63,8 +64,8 @@ def make_intent_predictor(spec: object = None) -> Predictor:
     methods = ("stream", "predict_proba")
     if isinstance(predictor, type) or not any(callable(getattr(predictor, method, None)) for method in methods):
         raise TypeError(
-            "a predictor is an object with a method `stream` or `predict_proba`, a name, 'module:Class' or None; "
-            f"got {spec!r}"
+            "a `predictor` must be an object with a method `stream` or `predict_proba`, a name, 'module:Class' or "
+            f"None, got {shown(spec)}"
         )
     return predictor  # type: ignore[return-value]  # has one of the methods
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from legible_envs.support.validation import real
 from legible_envs.tabletop.objects import Point, point
 from legible_envs.tabletop.partner.intent import IntentObserver
 from legible_envs.tabletop.partner.interface import Command, Floats, Senses, State
@@ -105,13 +106,13 @@ class RobotPartner:
         clearance: float = 0.06,
         home: Point | None = None,
     ) -> None:
-        self.threshold = _number("threshold", threshold, 0, 1)
-        self.rate = _number("rate", rate, 1)
-        self.max_speed = _number("max_speed", max_speed, 1e-3)
-        self.acceleration = _number("acceleration", acceleration, 1e-3)
-        self.reach = _number("reach", reach, 1e-4)
-        self.grasp_time = _number("grasp_time", grasp_time, 0)
-        self.clearance = _number("clearance", clearance, 0)
+        self.threshold = real("the robot's `threshold`", threshold, 0, 1)
+        self.rate = real("the robot's `rate`", rate, 1)
+        self.max_speed = real("the robot's `max_speed`", max_speed, 1e-3)
+        self.acceleration = real("the robot's `acceleration`", acceleration, 1e-3)
+        self.reach = real("the robot's `reach`", reach, 1e-4)
+        self.grasp_time = real("the robot's `grasp_time`", grasp_time, 0)
+        self.clearance = real("the robot's `clearance`", clearance, 0)
         self.home = None if home is None else point(home, "the robot's `home`")
         self._observer = IntentObserver(predictor)
 
@@ -239,12 +240,3 @@ class RobotPartner:
 def _pair(array: Floats) -> Point:
     x, y = array.tolist()
     return x, y
-
-
-def _number(name: str, value: object, least: float, most: float = math.inf) -> float:
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    number = float(value) if is_number else math.nan  # type: ignore[arg-type]
-    if not least <= number <= most or number == math.inf:
-        wanted = f"{least:g} to {most:g}" if most < math.inf else f"a finite number >= {least:g}"
-        raise ValueError(f"the robot's `{name}` must be {wanted}, got {value!r}")
-    return number

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.support.plugins import import_target
+from legible_envs.support.validation import shown
 from legible_envs.tabletop.game.game import DT, RATE, TableGame
 from legible_envs.tabletop.partner.fluency import TeamMetrics, tick_of
 from legible_envs.tabletop.partner.intent import IntentObserver
@@ -55,7 +56,7 @@ def make_partner(spec: object, predictor: object, threshold: float) -> Partner:
         ValueError: It cannot be imported or made.
         TypeError: It is no partner.
     """
-    if spec == "robot":
+    if isinstance(spec, str) and spec == "robot":
         spec = {}
     if isinstance(spec, Mapping):
         try:
@@ -72,7 +73,7 @@ def make_partner(spec: object, predictor: object, threshold: float) -> Partner:
         except Exception as error:
             raise ValueError(f"partner {spec!r} cannot be made: {type(error).__name__}: {error}") from error
     if isinstance(spec, type) or not all(callable(getattr(spec, name, None)) for name in ("reset", "step")):
-        raise TypeError(f"a partner is an object with the methods `reset` and `step`, got {spec!r}")
+        raise TypeError(f"a `partner` must be an object with the methods `reset` and `step`, got {shown(spec)}")
     return copy.deepcopy(spec)  # type: ignore[return-value]  # has the methods
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
+from legible_envs.support.validation import integer
 from legible_envs.tabletop.objects import Table
 
 __all__ = ["Frame", "check_width"]
@@ -13,9 +12,7 @@ __all__ = ["Frame", "check_width"]
 
 def check_width(width: int) -> int:
     """The width of a picture as given, if it can be drawn."""
-    if isinstance(width, bool) or not isinstance(width, int | np.integer) or not 120 <= width <= 4096:
-        raise ValueError(f"width must be a whole number of pixels from 120 to 4096, got {width!r}")
-    return int(width)
+    return integer("width", width, 120, 4096, unit="pixels")
 
 
 @dataclass(frozen=True)

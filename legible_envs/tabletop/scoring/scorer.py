@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from legible_envs.errors import LayoutError
 from legible_envs.observer import ObserverModel
+from legible_envs.support.validation import integer
 from legible_envs.tabletop.layout import MAX_OBSTACLES, TabletopLayout
 from legible_envs.tabletop.objects import OBSTACLE_SIZE, numbers
 from legible_envs.tabletop.scoring import explanation
@@ -78,9 +79,8 @@ class TabletopScorer:
     ) -> None:
         self.task = explanation.as_task(task)
         self.observer = observer
-        if isinstance(max_obstacles, bool) or not isinstance(max_obstacles, int) or max_obstacles < 0:
-            raise ValueError(f"max_obstacles must be an integer >= 0, got {max_obstacles!r}")
-        length, width = numbers(obstacle_size, 2, "obstacle_size", positive=True)
+        max_obstacles = integer("max_obstacles", max_obstacles, 0)
+        length, width = numbers(obstacle_size, 2, "`obstacle_size`", positive=True)
         self.max_obstacles = max_obstacles
         self.obstacle_size = (length, width)
         layout = self.task.layout

@@ -28,7 +28,7 @@ def observed_fractions(prefix: PrefixSpec) -> tuple[float, ...]:
     if prefix == "mean":
         return tuple((i + 0.5) / POINTS for i in range(POINTS))
     if isinstance(prefix, str):
-        raise ValueError(f"on a table, prefix must be 'mean' or fractions in (0, 1], got {prefix!r}")
+        raise ValueError(f"on a table, `prefix` must be 'mean' or fractions in (0, 1], got {prefix!r}")
     return tuple(sorted(prefix))
 
 

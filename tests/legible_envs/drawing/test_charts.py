@@ -110,7 +110,7 @@ def test_any_figure_of_matplotlib_can_be_written(tmp_path):
 def test_other_kinds_of_files_are_refused(tmp_path):
     with pytest.raises(ValueError, match=r"'\.svg', '\.pdf', '\.png'.*'a\.gif'"):
         save_figure(tmp_path / "a.gif", chart())
-    with pytest.raises(ValueError, match="size must be one of"):
+    with pytest.raises(ValueError, match="`size` must be one of"):
         chart("poster")
 
 

@@ -282,14 +282,17 @@ def test_settings_are_kept_and_checked():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"human": "drunk"}, "human must be one of"),
-        ({"human": "shortest", "rationality": 1.0}, "rationality belong"),
-        ({"horizon": 30}, "horizon belong"),
-        ({"human": "boltzmann", "rationality": 0.0}, "rationality must be"),
-        ({"human": "boltzmann", "rationality": math.inf}, "rationality must be"),
-        ({"human": "boltzmann", "rationality": True}, "rationality must be"),
-        ({"human": "boltzmann", "horizon": 9}, "at least 10 steps"),
-        ({"human": "boltzmann", "horizon": 20.0}, "horizon must be an integer"),
+        ({"human": "drunk"}, "`human` must be 'shortest' or 'boltzmann', got 'drunk'"),
+        ({"human": "shortest", "rationality": 1.0}, "`rationality` belong"),
+        ({"horizon": 30}, "`horizon` belong"),
+        ({"human": "boltzmann", "rationality": 0.0}, "`rationality` must be a finite number > 0, got 0.0"),
+        ({"human": "boltzmann", "rationality": math.inf}, "`rationality` must be a finite number > 0, got inf"),
+        ({"human": "boltzmann", "rationality": True}, "`rationality` must be a finite number > 0, got True"),
+        (
+            {"human": "boltzmann", "horizon": 9},
+            "`horizon` must be None or an integer >= 10 steps, the length of .* 9 cells, got 9",
+        ),
+        ({"human": "boltzmann", "horizon": 20.0}, "`horizon` must be None or an integer >= 10 steps, .*, got 20.0"),
     ],
 )
 def test_bad_settings(arguments, message):

@@ -137,7 +137,7 @@ def test_nothing_played_replaces_no_recording(keyboard, tmp_path: Path) -> None:
 
 
 def test_bad_arguments_fail_before_a_window_opens(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="fps must be 1 to 60"):
+    with pytest.raises(ValueError, match="`fps` must be a finite number from 1 to 60 steps per second"):
         play(TINY, fps=0)
     with pytest.raises(IsADirectoryError, match="name a file"):
         play(TINY, record=tmp_path)

@@ -76,14 +76,14 @@ def test_observers_check_their_settings():
     table = ObserverModel.in_metres()
     assert (table.beta, table.c, table.unit, table.prefix) == (20.0, 1.0, 0.05, "mean")
     for settings_, message in (
-        ({"beta": -1}, "beta must be"),
-        ({"c": math.nan}, "c must be"),
-        ({"c": True}, "c must be"),
-        ({"tie_tolerance": math.inf}, "tie_tolerance must be"),
-        ({"unit": 0}, "unit must be"),
-        ({"unit": -1}, "unit must be"),
-        ({"ties": "first"}, "ties must be"),
-        ({"prefix": "median"}, "prefix must be"),
+        ({"beta": -1}, "`beta` must be a finite number >= 0"),
+        ({"c": math.nan}, "`c` must be a finite number >= 0"),
+        ({"c": True}, "`c` must be a finite number >= 0, got True"),
+        ({"tie_tolerance": math.inf}, "`tie_tolerance` must be a finite number >= 0"),
+        ({"unit": 0}, "`unit` must be a finite number > 0 steps or metres, got 0"),
+        ({"unit": -1}, "`unit` must be a finite number > 0 steps or metres, got -1"),
+        ({"ties": "first"}, "`ties` must be 'expected' or 'strict'"),
+        ({"prefix": "median"}, "`prefix` must be"),
     ):
         with pytest.raises(ValueError, match=message):
             ObserverModel(**settings_)
@@ -98,7 +98,7 @@ def test_prefix_weights():
     assert prefix_weights((0.01, 1.0), 4) == [0.5, 0, 0.5]
     assert sum(prefix_weights((0.3, 0.31, 0.5), 2)) == pytest.approx(1)
     for bad in ("median", (), (0.0,), (1.5,), 2.0):
-        with pytest.raises(ValueError, match="prefix must be"):
+        with pytest.raises(ValueError, match="`prefix` must be"):
             check_prefix(bad)
 
 

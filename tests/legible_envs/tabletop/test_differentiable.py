@@ -185,7 +185,7 @@ def test_a_workspace_with_continuous_measures_is_one(ws):
     assert (low, high, cells) == (pytest.approx(0.10), pytest.approx(0.80), 35)
     with pytest.raises(ValueError, match="'placement', not 'both'"):
         TabletopWorkspace(second_measure="mean x")
-    with pytest.raises(ValueError, match="second_measure must be one of"):
+    with pytest.raises(ValueError, match="`second_measure` must be 'order' or 'mean x', got 'x'"):
         TabletopWorkspace(condition="placement", second_measure="x")
     with pytest.raises(ValueError, match="no gradient"):
         TabletopWorkspace(condition="placement").gradients(np.zeros((1, 32)))

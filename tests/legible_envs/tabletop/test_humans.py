@@ -226,8 +226,8 @@ def test_people_differ_by_the_spreads_of_the_model() -> None:
     ("options", "message"),
     [
         ({"skew": 0.0}, "skew"),
-        ({"skew": -1.0}, "skew must be a finite number >= 0"),
-        ({"bow": np.nan}, "bow must be a finite number,"),
+        ({"skew": -1.0}, "`skew` must be a finite number >= 0"),
+        ({"bow": np.nan}, "`bow` must be a finite number,"),
         ({"endpoint_sd": "wide"}, "endpoint_sd"),
         ({"crossing_rate": 1.5}, "crossing_rate is a probability"),
         ({"crossing_rate": True}, "crossing_rate"),

@@ -153,7 +153,10 @@ def test_overlap_of_oriented_rectangles_against_shapely():
         ({"objects": [{"name": "a", "at": [0.1, "x"]}]}, "object 'a': `at` must be 2 finite numbers"),
         ({"objects": [{"name": "a", "at": [0.1, float("nan")]}]}, "object 'a': `at` must be 2 finite numbers"),
         ({"objects": [{"name": "a", "at": [0.1, 0.2], "size": [0, 1]}]}, "2 positive numbers"),
-        ({"objects": [{"name": "a", "at": [0.1, 0.2], "movable": "no"}]}, "true or false"),
+        (
+            {"objects": [{"name": "a", "at": [0.1, 0.2], "movable": "no"}]},
+            "object 'a': `movable` must be True or False",
+        ),
         ({"objects": [{"name": "a", "at": [0.1, 0.2]}] * 2}, r"repeated: \['a'\]"),
         ({"objects": [{"name": "home", "at": [0.1, 0.2]}]}, r"repeated: \['home'\]"),
         ({"obstacles": [{"at": [0.1]}]}, "2 finite numbers"),
@@ -162,7 +165,7 @@ def test_overlap_of_oriented_rectangles_against_shapely():
         ({"table": {"region": [0.5, 0.1, 0.4, 0.2]}}, "x0 < x1"),
         ({"table": {"starts": {"home": [3, 3]}}}, "off the table"),
         ({"table": {"starts": {}}}, "at least one point"),
-        ({"table": {"hand": -1}}, "at least 0"),
+        ({"table": {"hand": -1}}, "the table's `hand` must be a finite number >= 0"),
     ],
 )
 def test_wrong_json_says_where(change, message):

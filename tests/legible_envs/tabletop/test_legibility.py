@@ -282,11 +282,11 @@ def test_layouts_of_another_task_are_refused():
     [
         ({"beta": -1.0}, "beta"),
         ({"beta": math.nan}, "beta"),
-        ({"c": math.inf}, "c must"),
+        ({"c": math.inf}, "`c` must be a finite number >= 0, got inf"),
         ({"unit": 0.0}, "unit"),
-        ({"prefix": "sum"}, "prefix must be 'mean'"),
-        ({"prefix": (0.0, 0.5)}, "prefix must be 'mean'"),
-        ({"prefix": ()}, "prefix must be 'mean'"),
+        ({"prefix": "sum"}, "`prefix` must be 'mean'"),
+        ({"prefix": (0.0, 0.5)}, "`prefix` must be 'mean'"),
+        ({"prefix": ()}, "`prefix` must be 'mean'"),
         ({"ties": "first"}, "ties"),
     ],
 )

@@ -169,7 +169,7 @@ def test_a_search_may_start_from_a_table():
 @pytest.mark.parametrize(
     ("options", "error", "message"),
     [
-        ({"condition": "all"}, ValueError, "condition must be one of"),
+        ({"condition": "all"}, ValueError, "`condition` must be one of"),
         ({"task": "soup"}, TaskError, "no task 'soup'"),
         ({"max_obstacles": 0}, ValueError, "needs max_obstacles >= 1"),
         ({"max_obstacles": -1}, ValueError, "max_obstacles"),
