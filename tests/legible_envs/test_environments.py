@@ -203,7 +203,7 @@ def test_rendering_without_a_mode_warns(plain: Case) -> None:
 
 
 def test_unknown_render_modes_are_named(plain: Case) -> None:
-    with pytest.raises(ValueError, match=r"`render_mode` must be None or one of .*rgb_array.*'poem'"):
+    with pytest.raises(ValueError, match=r"`render_mode` must be None or .*'rgb_array'.*, got 'poem'"):
         type(plain.make().unwrapped)(render_mode="poem")
 
 
