@@ -218,6 +218,7 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
         self._game.begin(layout, layout.place(start), start)
         self._team = self._make_team(partner, predictor)
         self._observations = ObservationBuilder(self.settings.task, max_obstacles, partner is not None)
+        self._masks: dict[tuple[str, ...], npt.NDArray[np.bool_]] = {}
         self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
         self.observation_space = self._observations.space
         self._chosen: TabletopLayout | None = None
@@ -270,7 +271,7 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
         self._team.begin(self._game, self.np_random)
         if self.render_mode == "human":
             self.render()
-        return self._observations.observe(self._game, self._team), self._info()
+        return self._look()
 
     def step(self, action: npt.ArrayLike) -> tuple[npt.NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """Advance by 1/30 s.
@@ -297,7 +298,8 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
         reward = settings.done_reward * finished - settings.time_cost * DT - settings.crossing_cost * crossed
         if self.render_mode == "human":
             self.render()
-        return self._observations.observe(game, self._team), reward, game.progress.is_over, False, self._info()
+        observation, info = self._look()
+        return observation, reward, game.progress.is_over, False, info
 
     # -- layouts -------------------------------------------------------------------------------------------------------
 
@@ -435,12 +437,16 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
         """Keys for ``gymnasium.utils.play`` (``noop=np.zeros(2)``): arrows or W A S D; let go to take and place."""
         return keys_to_action(self.max_speed)
 
-    def _info(self) -> dict[str, Any]:
+    def _look(self) -> tuple[npt.NDArray[np.float32], dict[str, Any]]:
+        """Observation and info of this moment."""
+        goals = self._game.goals
+        return self._observations.observe(self._game, self._team, goals), self._info(goals)
+
+    def _info(self, goals: tuple[str, ...]) -> dict[str, Any]:
         game = self._game
-        goals = game.goals
         return {
             "goals": goals,
-            "goal_mask": np.array([name in goals for name in game.names]),
+            "goal_mask": self._mask(goals),
             "candidate_set": "game",
             "start": game.progress.place,
             "stage": game.progress.stage(goals),
@@ -452,6 +458,12 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
             "layout_id": game.layout.layout_id,
             **self._team.info(),
         }
+
+    def _mask(self, goals: tuple[str, ...]) -> npt.NDArray[np.bool_]:
+        """A new mask over the objects; a task has few sets of valid goals, so each is worked out once."""
+        if goals not in self._masks:
+            self._masks[goals] = np.array([name in goals for name in self._game.names])
+        return self._masks[goals].copy()
 
     def _name(self, i: int) -> str | None:
         return self._game.names[i] if i >= 0 else None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -69,8 +70,8 @@ class ObservationBuilder:
             angle = obstacle.angle % math.pi  # turned by half a circle an obstacle is the same
             row[:] = (1.0, *obstacle.at, math.cos(angle), math.sin(angle), *obstacle.size)
 
-    def observe(self, game: TableGame, team: Team) -> npt.NDArray[np.float32]:
-        """A new vector."""
+    def observe(self, game: TableGame, team: Team, goals: Sequence[str]) -> npt.NDArray[np.float32]:
+        """A new vector; ``goals`` are the game's, which are looked up once a step."""
         values = self._fixed.copy()
         top = game.rules.max_speed
         at = game.delivery.at if game.delivery is not None else None
@@ -90,7 +91,7 @@ class ObservationBuilder:
         rows[:, 3] = np.sin(game.physics.angles)
         for column, code in enumerate((FREE, HAND, ROBOT, PLACED), 4):
             rows[:, column] = game.status == code
-        for name in game.goals:
+        for name in goals:
             rows[game.index[name], 8] = 1.0
         if game.goal is not None:
             rows[game.index[game.goal], 9] = 1.0
