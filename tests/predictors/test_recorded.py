@@ -17,22 +17,11 @@ from benchmarks.experiments.prediction import (
 )
 from benchmarks.experiments.prediction.run import score_every_trajectory
 from benchmarks.experiments.prediction.sweep import LAYOUTS, REFERENCE
-from legible_envs.datasets.overcooked_2019 import RecordingsError, recorded_trajectories
+from legible_envs.datasets.overcooked_2019 import recorded_trajectories
 from predictors import GridLogistic, GridNeighbours, GridNGram
 
 
-def have_recordings() -> bool:
-    try:
-        return bool(recorded_trajectories(None, ["cramped_room"]))
-    except RecordingsError:
-        return False
-
-
-needs_recordings = pytest.mark.skipif(not have_recordings(), reason="no recorded games: legible humans fetch")
-
-
 @pytest.mark.data
-@needs_recordings
 def test_beliefs_about_recorded_people_are_honest_before_they_move() -> None:
     walks = recorded_trajectories(None, ["cramped_room"])[:120]
     counts = Counter(w.goal for w in walks)
@@ -45,7 +34,6 @@ def test_beliefs_about_recorded_people_are_honest_before_they_move() -> None:
 
 @pytest.mark.data
 @pytest.mark.slow
-@needs_recordings
 def test_all_predictors_are_as_accurate_as_measured_before() -> None:
     table = compare_with_reference(score_recorded_play())
     assert len(table) == len(LAYOUTS) * len(PREDICTORS)
@@ -58,7 +46,6 @@ def test_all_predictors_are_as_accurate_as_measured_before() -> None:
 
 
 @pytest.mark.data
-@needs_recordings
 def test_untrained_predictors_are_as_accurate_as_measured_before() -> None:
     scores = score_recorded_play(predictors=UNTRAINED, repeats=1)
     table = accuracy_table(scores).set_index(["layout", "predictor"])
@@ -80,7 +67,6 @@ def test_untrained_predictors_are_as_accurate_as_measured_before() -> None:
 
 
 @pytest.mark.data
-@needs_recordings
 def test_candidates_of_the_running_game_are_judged_apart() -> None:
     rows = score_every_trajectory(layouts=("cramped_room",), fractions=(0.5,), candidate_set="game", repeats=1)
     assert rows.attrs["candidate_set"] == "game"
