@@ -24,7 +24,7 @@ from legible_envs.tabletop.objects import OBSTACLE_SIZE, numbers
 from legible_envs.tabletop.scoring.explanation import summarise
 from legible_envs.tabletop.scoring.scorer import TableScores, TabletopScorer
 from legible_envs.tabletop.task import TabletopTask, task_names
-from legible_envs.workspace import Array, ObjectiveName, Workspace, as_batch, as_single
+from legible_envs.workspace import Array, ObjectiveName, Workspace, as_batch, as_single, make_workspace
 
 __all__ = ["DesignMode", "TabletopWorkspace"]
 
@@ -482,8 +482,6 @@ class TabletopWorkspace(Workspace):
         }
 
     def __reduce__(self) -> tuple[object, ...]:
-        from legible_envs.workspace import make_workspace
-
         return make_workspace, (self.to_config(),)
 
 
