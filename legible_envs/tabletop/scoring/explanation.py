@@ -52,8 +52,7 @@ def path_lengths(layout: TabletopLayout, pairs: Sequence[tuple[str, str]]) -> di
     """
     names = (*layout.goals, *layout.table.starts)
     places = np.array([layout.place(name) for name in names])
-    obstacles = [(*o.at, o.angle, *o.size) for o in layout.obstacles]
-    metres = ShortestPaths(places, obstacles, layout.table.hand, layout.table.size, names).lengths(places)
+    metres = ShortestPaths.of(layout, places, names).lengths(places)
     lengths = {(a, b): float(metres[names.index(a), names.index(b)]) for a, b in pairs}
     for (a, b), length in lengths.items():
         if math.isinf(length):
