@@ -18,14 +18,14 @@ from legible_envs.overcooked.batch_game import GameOfBatch
 from legible_envs.overcooked.env import NUM_ACTIONS, OvercookedEnv
 from legible_envs.overcooked.game import batch
 from legible_envs.overcooked.game.batch import Batch, Outcome
-from legible_envs.overcooked.game.rules import pack_rules
+from legible_envs.overcooked.game.rules import count_pots, pack_rules
 from legible_envs.overcooked.game.snapshot import make_view, name_goals, to_text
 from legible_envs.overcooked.game.vectors import CROSSINGS, DELIVERIES, STATE_SIZE, Kitchen, Vector
 from legible_envs.overcooked.game.view import GameView
 from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.overcooked.layouts import read_layout
 from legible_envs.overcooked.rendering.board import draw_small, tile_pictures
-from legible_envs.overcooked.settings import KitchenSettings, PackedKitchen, count_pots
+from legible_envs.overcooked.settings import KitchenSettings, PackedKitchen
 from legible_envs.support.specs import JsonSpec, check_options
 from legible_envs.support.validation import choice, integer, is_integer
 
