@@ -119,7 +119,7 @@ def read_start(value: object, layout: TabletopLayout) -> Start:
         LayoutError: There is none of this name; or the point is off the table, or inside a grown obstacle.
     """
     if isinstance(value, str):
-        if value not in {*layout.table.starts, *layout.goals}:
+        if value not in layout.place_names:
             raise LayoutError(
                 f"no start {value!r}; this table has {[*layout.table.starts, *layout.goals]}", rule="start"
             )

@@ -65,7 +65,7 @@ class TabletopTask:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
             raise TaskError(f"a task needs a non-empty name, got {self.name!r}")
-        known = {*self.layout.goals, *self.layout.table.starts}
+        known = self.layout.place_names
         unknown = [place for place in self.graph.places if place not in known]
         if unknown:
             raise TaskError(f"task {self.name!r} needs {unknown}, which the table lacks; it has {sorted(known)}")

@@ -399,7 +399,7 @@ def _checked_rate(rate: float) -> float:
 def _checked_task(task: TabletopTask | None, layout: TabletopLayout) -> TabletopTask:
     if task is None:
         return TabletopTask.for_layout(layout)
-    known = {*layout.goals, *layout.table.starts}
+    known = layout.place_names
     missing = [place for place in task.graph.places if place not in known]
     if missing:
         raise LayoutError(
