@@ -175,9 +175,10 @@ def draw_person(people: Mapping[str, Any]) -> Callable[..., Walker]:
     """A function that draws participants for :func:`~legible_envs.overcooked.humans.simulate_participants`.
 
     Args:
-        people: Plain data: ``walker`` and its parameters, as :func:`benchmarks.experiments.overcooked.sweep.people_of`
-            makes them. Boltzmann walkers have lognormal rationality; planners the cost of turning and the slips of one
-            recorded participant each, drawn at random.
+        people: Plain data: ``walker``, ``"boltzmann"`` or ``"planner"``, and its parameters. Boltzmann walkers have
+            lognormal rationality (``rationality``, ``spread``, ``preference``); planners share ``depth``, ``recency``,
+            ``fade`` and ``preference``, and have the ``(turn_cost, slip)`` of one recorded participant each, drawn at
+            random from ``people``.
     """
     kind, preference = people["walker"], float(people["preference"])
     if kind == "boltzmann":
