@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from legible_envs.random_keys import BoundedKeys, KeyDecoder
 from legible_envs.support.plugins import Plugin, Registry
+from legible_envs.support.validation import real
 
 if TYPE_CHECKING:
     from legible_envs.rollouts.trajectory import Trajectory
@@ -262,8 +263,8 @@ class Objective:
     def __init__(self, workspace: Workspace, name: ObjectiveName, max_distance: float | None = None) -> None:
         if name not in get_args(ObjectiveName):
             raise ValueError(f"unknown objective {name!r}; expected one of {list(get_args(ObjectiveName))}")
-        if max_distance is not None and not max_distance > 0:
-            raise ValueError(f"max_distance must be a positive number or None, got {max_distance!r}")
+        if max_distance is not None:
+            real("max_distance", max_distance, 0, closed="neither", also="None")
         self.workspace = workspace
         self.name = name
         self.max_distance = max_distance

@@ -114,7 +114,7 @@ def search(
     )
     with contextlib.closing(run.evaluator):
         run.open(resume=resume, overwrite=overwrite)
-        return _conduct(run, callbacks, time_limit, progress, checkpoint)
+        return _conduct(run, callbacks, time_limit, progress)
 
 
 def _conduct(
@@ -122,7 +122,6 @@ def _conduct(
     callbacks: Sequence[Callback],
     time_limit: float | None,
     progress: bool | None,
-    checkpoint: str | Path | None,
 ) -> SearchResult:
     """Search until something ends it; the error of one that fails carries what was found."""
     deadline = None if time_limit is None else time.monotonic() + time_limit
@@ -135,7 +134,7 @@ def _conduct(
                 error.partial = run.rescue()  # type: ignore[attr-defined]
             raise
     if stopped == "interrupted":
-        where = "" if checkpoint is None else f"; saved in {checkpoint}, continue with resume=True"
+        where = "" if run.folder is None else f"; saved in {run.folder.path}, continue with resume=True"
         raise SearchInterrupted(f"interrupted after {result.evaluations:,} evaluations{where}", partial=result)
     return result
 

@@ -17,7 +17,9 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Canvas", "Image", "Sprite", "load_pygame", "mix", "paste", "rgb", "text_sprite"]
+from legible_envs.drawing.palette import HEAT
+
+__all__ = ["Canvas", "Image", "Sprite", "heat_colour", "load_pygame", "mix", "paste", "rgb", "text_sprite"]
 
 Image = npt.NDArray[np.uint8]
 Point = tuple[float, float]
@@ -50,6 +52,13 @@ def mix(first: str, second: str, share: float) -> str:
     """The colour ``share`` of the way from the first to the second."""
     pairs = zip(rgb(first), rgb(second), strict=True)
     return "#" + "".join(f"{round(a + (b - a) * share):02x}" for a, b in pairs)
+
+
+def heat_colour(value: float) -> str:
+    """The colour of a value from 0 to 1 on the ramp ``HEAT``; values beyond count as the nearer end."""
+    place = min(max(value, 0.0), 1.0) * (len(HEAT) - 1)
+    below = min(int(place), len(HEAT) - 2)
+    return mix(HEAT[below], HEAT[below + 1], place - below)
 
 
 class Sprite(NamedTuple):

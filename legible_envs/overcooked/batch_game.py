@@ -46,6 +46,8 @@ class GameOfBatch:
         index: Number of the game.
     """
 
+    get_keys_to_action = staticmethod(OvercookedEnv.get_keys_to_action)
+
     def __init__(self, envs: Games, index: int) -> None:
         self._envs = envs
         self._index = index
@@ -99,6 +101,6 @@ class GameOfBatch:
         return draw_game(self.view())
 
     def __getattr__(self, name: str) -> Any:
-        if name in ("settings", "render_mode", "metadata", "get_keys_to_action"):
-            return getattr(self._envs if name != "get_keys_to_action" else OvercookedEnv, name)
+        if name in ("settings", "render_mode", "metadata"):
+            return getattr(self._envs, name)
         raise AttributeError(f"the games of a batch have no attribute {name!r}")

@@ -15,6 +15,7 @@ import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
+from legible_envs.overcooked.game.vectors import INTERACT, STAY
 from legible_envs.overcooked.layout import INGREDIENTS, OvercookedLayout
 from legible_envs.overcooked.recipes import PAPER_SOUPS, Recipe, check_recipes
 from legible_envs.support.files import write_npz
@@ -26,8 +27,6 @@ if TYPE_CHECKING:
 __all__ = ["Played", "load_played", "play", "read_played", "recipes_for", "trajectories_from_played"]
 
 ENV_ID: Final = "LegibleOvercooked-v0"
-STAY: Final = 4
-INTERACT: Final = 5
 _POLLS_PER_SECOND: Final = 60
 _QUEUE: Final = 2  # more taps than this ahead of the game would make it feel slow to answer
 _SCHEMA: Final = 1

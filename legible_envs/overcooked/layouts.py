@@ -156,7 +156,7 @@ class LayoutSet:
     """Uniform over given kitchens.
 
     Args:
-        layouts: Kitchens, or anything that :func:`~legible_envs.overcooked.layouts.read_layout` understands.
+        layouts: Kitchens, or anything that :func:`read_layout` understands.
         shape: Rows and columns they must have.
 
     Raises:
@@ -164,8 +164,6 @@ class LayoutSet:
     """
 
     def __init__(self, layouts: Sequence[Any], shape: Sequence[int]) -> None:
-        from legible_envs.overcooked.layouts import read_layout
-
         self.shape = check_shape(shape)
         self.layouts = tuple(read_layout(layout, self.shape) for layout in layouts)
         if not self.layouts:

@@ -101,18 +101,21 @@ class ScriptedPlayer:
         action_mask: npt.NDArray[np.int8],
         layout_id: str,
     ) -> int:
-        state, kitchen, rules = arrays
         if not self._has_goal(index, goal_mask, layout_id):
             return STAY
+        action = self._approach(index, arrays, bool(action_mask[INTERACT]))
+        if action == INTERACT:
+            self._goals[index] = -1
+        return action
+
+    def _approach(self, index: int, arrays: tuple[Vector, Kitchen, Vector], can_interact: bool) -> int:
+        """The next action on the path to a game's goal; INTERACT uses it."""
+        state, kitchen, rules = arrays
         cell, facing = int(state[AT_PLAYERS]), int(state[AT_PLAYERS + 1])
         goal, steps = self._goals[index], self._steps[index]
         if steps is None or steps[cell] < 0:
             steps = self._steps[index] = self._find_steps(index, cell, kitchen, rules)
-        can_interact = bool(action_mask[INTERACT])
-        action = choose_action(cell, facing, goal, steps, self._height, self._width, can_interact, self.rng.random())
-        if action == INTERACT:
-            self._goals[index] = -1
-        return int(action)
+        return int(choose_action(cell, facing, goal, steps, self._height, self._width, can_interact, self.rng.random()))
 
     def _find_steps(self, index: int, cell: int, kitchen: Kitchen, rules: Vector) -> npt.NDArray[np.int32]:
         """``(H*W,)`` fewest moves from the goal's cell, over obstacles only where no other path leads."""
@@ -168,17 +171,8 @@ class WalkingPlayer(ScriptedPlayer):
     def _forget_path(self, index: int) -> None:
         self._paths[index] = None
 
-    def _act(
-        self,
-        index: int,
-        arrays: tuple[Vector, Kitchen, Vector],
-        goal_mask: npt.NDArray[np.bool_],
-        action_mask: npt.NDArray[np.int8],
-        layout_id: str,
-    ) -> int:
+    def _approach(self, index: int, arrays: tuple[Vector, Kitchen, Vector], can_interact: bool) -> int:
         state, kitchen, rules = arrays
-        if not self._has_goal(index, goal_mask, layout_id):
-            return STAY
         cell, facing = int(state[AT_PLAYERS]), int(state[AT_PLAYERS + 1])
         path = self._paths[index]
         if path is None or not path.leads_from(cell):
@@ -195,10 +189,7 @@ class WalkingPlayer(ScriptedPlayer):
         direction = path.next_direction(cell, self.walker, self.rng)
         if neighbour(cell, direction, self._height, self._width) != self._goals[index] or facing != direction:
             return direction
-        if not action_mask[INTERACT]:
-            return STAY
-        self._goals[index] = -1
-        return INTERACT
+        return INTERACT if can_interact else STAY
 
 
 class _Path:

@@ -12,15 +12,15 @@ from gymnasium import spaces
 from legible_envs.errors import LayoutError
 from legible_envs.overcooked.game.goals import missing_station
 from legible_envs.overcooked.game.observations import GRID_CHANNELS, NUM_FEATURES, find_routes
-from legible_envs.overcooked.game.rules import GameRules, pack_kitchen, pack_rules
-from legible_envs.overcooked.game.vectors import POT_CELL, Kitchen, Vector
+from legible_envs.overcooked.game.rules import GameRules, count_pots, pack_kitchen, pack_rules
+from legible_envs.overcooked.game.vectors import Kitchen, Vector
 from legible_envs.overcooked.layout import INGREDIENTS, STATION_TYPES, OvercookedLayout, check_shape
 from legible_envs.overcooked.layouts import LayoutDistribution, default_layout, read_distribution, read_layout
 from legible_envs.overcooked.recipes import PAPER_SOUPS, check_recipes
 from legible_envs.overcooked.rendering.board import RGB_TILE
 from legible_envs.support.validation import choice, flag, real
 
-__all__ = ["OBS_TYPES", "SHAPING", "KitchenSettings", "PackedKitchen", "count_pots"]
+__all__ = ["OBS_TYPES", "SHAPING", "KitchenSettings", "PackedKitchen"]
 
 OBS_TYPES: Final = ("grid", "vector", "rgb")
 SHAPING: Final[Mapping[str, float]] = {"ingredient": 3.0, "dish": 3.0, "soup": 5.0}
@@ -81,18 +81,16 @@ class KitchenSettings:
             return self.layout
         return self.distribution.sample(np.random.default_rng(0))
 
-    def pack(self, layout: OvercookedLayout, num_pots: int | None = None) -> PackedKitchen:
-        """The arrays that the kernels read.
+    def pack(self, layout: OvercookedLayout) -> PackedKitchen:
+        """The arrays that the kernels read, with room for as many pots as there are.
 
         Args:
             layout: A kitchen of the right shape.
-            num_pots: Room for this many pots; None means as many as there are.
 
         Raises:
             LayoutError: The recipes cannot be cooked in this kitchen.
         """
-        pots = count_pots(layout) if num_pots is None else num_pots
-        rules = pack_rules(self.rules, self.shape, 1, pots)
+        rules = pack_rules(self.rules, self.shape, 1, count_pots(layout))
         kitchen = pack_kitchen(layout, rules)
         self._check_playable(layout, kitchen, rules)
         if self.obs_type != "vector":
@@ -147,8 +145,3 @@ def _read_shaping(shaping: bool | Mapping[str, float]) -> Mapping[str, float]:
             raise ValueError(f"unknown rewards {unknown} in `shaping`; known: {list(SHAPING)}")
         return {key: real(f"reward {key!r} of `shaping`", shaping.get(key, 0.0)) for key in SHAPING}
     return SHAPING if flag("shaping", shaping, also="a mapping of rewards,") else dict.fromkeys(SHAPING, 0.0)
-
-
-def count_pots(layout: OvercookedLayout) -> int:
-    """Number of pots in a kitchen."""
-    return int(np.count_nonzero(layout.cells == POT_CELL))

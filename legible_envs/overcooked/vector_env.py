@@ -18,14 +18,14 @@ from legible_envs.overcooked.batch_game import GameOfBatch
 from legible_envs.overcooked.env import NUM_ACTIONS, OvercookedEnv
 from legible_envs.overcooked.game import batch
 from legible_envs.overcooked.game.batch import Batch, Outcome
-from legible_envs.overcooked.game.rules import pack_rules
+from legible_envs.overcooked.game.rules import count_pots, pack_rules
 from legible_envs.overcooked.game.snapshot import make_view, name_goals, to_text
 from legible_envs.overcooked.game.vectors import CROSSINGS, DELIVERIES, STATE_SIZE, Kitchen, Vector
 from legible_envs.overcooked.game.view import GameView
 from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.overcooked.layouts import read_layout
 from legible_envs.overcooked.rendering.board import draw_small, tile_pictures
-from legible_envs.overcooked.settings import KitchenSettings, PackedKitchen, count_pots
+from legible_envs.overcooked.settings import KitchenSettings, PackedKitchen
 from legible_envs.support.specs import JsonSpec, check_options
 from legible_envs.support.validation import choice, integer, is_integer
 
@@ -138,7 +138,7 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
         seeds = self._read_seeds(seed)
         which = self._read_mask(asked)
         if "layout" in asked:
-            chosen = None if asked["layout"] is None else self._read(asked["layout"], None)
+            chosen = None if asked["layout"] is None else self._read(asked["layout"], {})
             for i in np.flatnonzero(which):
                 self._chosen[i] = chosen
         for i in np.flatnonzero(which):
@@ -290,14 +290,11 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
 
     # -- inside -------------------------------------------------------------------------------------------------------
 
-    def _read(self, value: Any, known: dict[int, PackedKitchen] | None) -> PackedKitchen:
+    def _read(self, value: Any, known: dict[int, PackedKitchen]) -> PackedKitchen:
         """Read and check a kitchen; one object given for many games is read once."""
-        if known is not None and id(value) in known:
-            return known[id(value)]
-        packed = self.settings.pack(read_layout(value, self.settings.shape))
-        if known is not None:
-            known[id(value)] = packed
-        return packed
+        if id(value) not in known:
+            known[id(value)] = self.settings.pack(read_layout(value, self.settings.shape))
+        return known[id(value)]
 
     def _read_seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
         if seed is None:

@@ -1,4 +1,4 @@
-"""Trajectories: one person's motion from one start to one goal, how a prefix of it is cut, and the files that keep it.
+"""Trajectories: one person's motion from one start to one goal, and how a prefix of it is cut.
 
 A *rollout* is one recorded or simulated episode; a *trajectory* is the part of it from a start to a goal, with what an
 observer may know beforehand: where the person started, and which goals are possible.
@@ -9,13 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
-
-if TYPE_CHECKING:
-    pass
 
 __all__ = ["CUTS", "Cut", "Trajectory"]
 

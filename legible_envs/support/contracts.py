@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 
-__all__ = ["ContractError", "find_problems", "refuse"]
+__all__ = ["ContractError", "find_problems", "global_random_state", "refuse"]
 
 
 class ContractError(ValueError):
@@ -36,13 +36,13 @@ def find_problems(checks: Mapping[str, Callable[[], Iterable[str]]]) -> list[str
         The sentences, and one more if numpy's global random state was touched meanwhile.
     """
     problems: list[str] = []
-    before = _global_random_state()
+    before = global_random_state()
     for what, check in checks.items():
         try:
             problems += check()
         except Exception as error:
             problems.append(f"{what}: raised {type(error).__name__}: {error}")
-    if _global_random_state() != before:
+    if global_random_state() != before:
         problems.append("it draws from numpy's global random state; use only the generator it is given")
     return problems
 
@@ -54,5 +54,6 @@ def refuse(plugin: object, kind: str, problems: Iterable[str], error: type[Contr
         raise error(f"{type(plugin).__name__} breaks the {kind} contract:\n{listed}", problems)
 
 
-def _global_random_state() -> bytes:
+def global_random_state() -> bytes:
+    """The state of numpy's global generator, which no plug-in may touch, as bytes to compare."""
     return pickle.dumps(np.random.get_state())  # noqa: NPY002 - watched, not used

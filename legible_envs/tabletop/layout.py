@@ -116,6 +116,16 @@ class TabletopLayout:
         array.setflags(write=False)
         return array
 
+    @property
+    def place_names(self) -> tuple[str, ...]:
+        """Names of all places: the objects, then the table's starts."""
+        return (*self.goals, *self._table.starts)
+
+    @property
+    def points(self) -> npt.NDArray[np.float64]:
+        """``(n, 2)`` a new array of these places."""
+        return np.array([*(o.at for o in self._objects), *self._table.starts.values()])
+
     def index(self, name: str) -> int:
         """Position of an object in :attr:`objects`.
 

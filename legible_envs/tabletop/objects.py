@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import partial
 from typing import Any, Final
@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.errors import LayoutError
-from legible_envs.support.validation import flag, is_real, real, shown
+from legible_envs.support.validation import entries, flag, is_real, real, shown
 
 __all__ = ["CUBE", "OBSTACLE_SIZE", "Table", "TableObject", "VirtualObstacle", "rectangle", "rectangles_overlap"]
 
@@ -29,8 +29,7 @@ def numbers(value: Any, count: int, what: str, *, positive: bool = False) -> tup
     Raises:
         LayoutError: Another value; ``what`` says where.
     """
-    is_list = isinstance(value, Iterable) and not isinstance(value, (str, bytes, Mapping))
-    found = list(value) if is_list else [value]
+    found = entries(value) or [value]
     ok = len(found) == count and all(map(is_real, found))
     if not ok or (positive and min(found) <= 0):
         kind = "positive number" if positive else "finite number"

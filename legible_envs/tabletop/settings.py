@@ -11,14 +11,14 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from legible_envs.errors import LayoutError, TaskError
+from legible_envs.errors import LayoutError
 from legible_envs.support.validation import choice, integer, real, shown
 from legible_envs.tabletop.game.game import CONTACTS, GameRules
 from legible_envs.tabletop.layout import TabletopLayout
 from legible_envs.tabletop.objects import Point, point
-from legible_envs.tabletop.task import TabletopTask
+from legible_envs.tabletop.task import TabletopTask, read_task
 
-__all__ = ["HAND_SPEED", "Start", "TableSettings", "keys_to_action", "read_layout", "read_start", "read_task"]
+__all__ = ["HAND_SPEED", "Start", "TableSettings", "keys_to_action", "read_layout", "read_start"]
 
 HAND_SPEED: Final = 0.5
 """How fast a key moves the hand, m/s: too fast to take an object, so that players take by letting go."""
@@ -30,30 +30,6 @@ _SETS: Final = (
 
 ELSEWHERE: Final = "elsewhere"
 """Name of a start that is none of the table's."""
-
-
-def read_task(value: object) -> TabletopTask:
-    """A task from any description of one.
-
-    Args:
-        value: A :class:`TabletopTask`, the name of one that comes with the package, the path of a YAML file, or a
-            mapping as :meth:`TabletopTask.from_dict` takes it.
-
-    Raises:
-        TaskError: Not a task.
-        FileNotFoundError: No such file.
-    """
-    if isinstance(value, TabletopTask):
-        return value
-    if isinstance(value, Mapping):
-        return TabletopTask.from_dict(value)
-    if isinstance(value, Path) or (isinstance(value, str) and value.endswith((".yaml", ".yml"))):
-        return TabletopTask.from_yaml(value)
-    if isinstance(value, str):
-        return TabletopTask.named(value)
-    raise TaskError(
-        f"`task` must be a TabletopTask, a name, a path or a mapping, got {type(value).__name__}: {shown(value)}"
-    )
 
 
 def read_layout(value: object, task: TabletopTask, max_obstacles: int) -> TabletopLayout:
@@ -143,7 +119,7 @@ def read_start(value: object, layout: TabletopLayout) -> Start:
         LayoutError: There is none of this name; or the point is off the table, or inside a grown obstacle.
     """
     if isinstance(value, str):
-        if value not in {*layout.table.starts, *layout.goals}:
+        if value not in layout.place_names:
             raise LayoutError(
                 f"no start {value!r}; this table has {[*layout.table.starts, *layout.goals]}", rule="start"
             )

@@ -13,11 +13,12 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.errors import LayoutError, TaskError
+from legible_envs.support.validation import shown
 from legible_envs.tabletop.layout import TabletopLayout
 from legible_envs.tabletop.objects import Point, point, rectangle, rectangles_overlap
 from legible_envs.tasks import TaskGraph
 
-__all__ = ["TabletopTask", "task_names"]
+__all__ = ["TabletopTask", "read_task", "task_names"]
 
 _SCHEMA = 1
 
@@ -64,7 +65,7 @@ class TabletopTask:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
             raise TaskError(f"a task needs a non-empty name, got {self.name!r}")
-        known = {*self.layout.goals, *self.layout.table.starts}
+        known = self.layout.place_names
         unknown = [place for place in self.graph.places if place not in known]
         if unknown:
             raise TaskError(f"task {self.name!r} needs {unknown}, which the table lacks; it has {sorted(known)}")
@@ -197,6 +198,30 @@ class TabletopTask:
         if path is not None:
             Path(path).write_text(text, encoding="utf-8")
         return text
+
+
+def read_task(value: object) -> TabletopTask:
+    """A task from any description of one.
+
+    Args:
+        value: A :class:`TabletopTask`, the name of one that comes with the package, the path of a YAML file, or a
+            mapping as :meth:`TabletopTask.from_dict` takes it.
+
+    Raises:
+        TaskError: Not a task.
+        FileNotFoundError: No such file.
+    """
+    if isinstance(value, TabletopTask):
+        return value
+    if isinstance(value, Mapping):
+        return TabletopTask.from_dict(value)
+    if isinstance(value, Path) or (isinstance(value, str) and value.endswith((".yaml", ".yml"))):
+        return TabletopTask.from_yaml(value)
+    if isinstance(value, str):
+        return TabletopTask.named(value)
+    raise TaskError(
+        f"`task` must be a TabletopTask, a name, a path or a mapping, got {type(value).__name__}: {shown(value)}"
+    )
 
 
 @cache

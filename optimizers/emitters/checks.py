@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from legible_envs.support.contracts import global_random_state
 from legible_envs.workspace import Workspace
 from optimizers.emitters.registry import EmitterSpec, emitter_name, make_emitter, resolve_emitter
 from optimizers.errors import EmitterError
@@ -70,13 +71,13 @@ class _Trial:
         self._rng = np.random.default_rng(0)
         start = workspace.sample(_INITIAL, self._rng)
         self.archive.add(start, self._rng.random(len(start)), workspace.measures(start))
-        before = _global_state()
+        before = global_random_state()
         self.emitter = make_emitter(spec, self.archive, workspace, seed=seed, options=options)
         self._adapted = isinstance(self.emitter, GenomeAdapter)
         for round_ in range(_ROUNDS):
             if not self._one_round(round_):
                 break
-        if _global_state() != before:
+        if global_random_state() != before:
             self.problems.append("it uses or seeds numpy's global random state; draw from a Generator made of `seed`")
 
     def _one_round(self, round_: int) -> bool:
@@ -102,12 +103,9 @@ class _Trial:
         try:
             self.emitter.tell(genomes, scores, measures, info)
         except Exception as error:
-            self.problems.append(
-                f"tell(solution, objective, measures, add_info) raised {_said(error)} in round {round_}; "
-                "scores of layouts that are not allowed are NaN"
-                if not self._adapted
-                else f"tell(solution, objective, measures, add_info) raised {_said(error)} in round {round_}"
-            )
+            hint = "" if self._adapted else "; scores of layouts that are not allowed are NaN"
+            call = "tell(solution, objective, measures, add_info)"
+            self.problems.append(f"{call} raised {_said(error)} in round {round_}{hint}")
             return False
         if round_ == 1:
             self._try_pickle()
@@ -161,11 +159,6 @@ def _repeats(trial: _Trial, again: Callable[[int], _Trial], seed: int) -> list[s
 
 def _equal(a: list[npt.NDArray[Any]], b: list[npt.NDArray[Any]]) -> bool:
     return len(a) == len(b) and all(np.array_equal(x, y) for x, y in zip(a, b, strict=True))
-
-
-def _global_state() -> bytes:
-    """Numpy's global random state, as bytes."""
-    return pickle.dumps(np.random.get_state(legacy=False))  # noqa: NPY002
 
 
 def _said(error: Exception) -> str:

@@ -37,7 +37,7 @@ def boards(best: pd.DataFrame) -> Any:
     """The layouts shown, with what is built and where the goal of a reach is ambiguous."""
     from legible_envs.tabletop import TabletopLayout
     from legible_envs.tabletop.rendering import draw_panels
-    from legible_envs.tabletop.settings import read_task
+    from legible_envs.tabletop.task import read_task
 
     layouts = {row["condition"]: TabletopLayout.from_json(row["json"]) for row in best.to_dict("records")}
     return draw_panels(
@@ -49,7 +49,7 @@ def spreads_over_tables(best: pd.DataFrame, spreads: pd.DataFrame, width: int = 
     """Mean reaches to every cube and ellipses of their covariances, on the layouts shown; nothing is warped."""
     from legible_envs.drawing.sheets import draw_side_by_side
     from legible_envs.tabletop import TabletopLayout
-    from legible_envs.tabletop.settings import read_task
+    from legible_envs.tabletop.task import read_task
 
     images, captions = [], []
     sizes = tables.sizes_of_covariances(spreads[spreads["alignment"] == "none"])

@@ -121,7 +121,7 @@ def find_table(trial: dict[str, Any]) -> dict[str, Any]:
 
 
 def _task() -> TabletopTask:
-    from legible_envs.tabletop.settings import read_task
+    from legible_envs.tabletop.task import read_task
 
     return read_task(TASK)
 

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from legible_envs.datasets.overcooked_2019.games import RecordedGame
 from legible_envs.overcooked.trajectories import dispensers_in_reach, trajectories
 from legible_envs.rollouts.trajectory import Trajectory
+from legible_envs.support.validation import choice
 
 __all__ = ["all_trajectories", "statistics", "trajectories_of_games"]
 
@@ -27,8 +28,7 @@ def trajectories_of_games(
     games: Sequence[RecordedGame], candidate_set: Literal["game", "all"] = "all", **limits: Any
 ) -> list[Trajectory]:
     """Trajectories of games; see :func:`legible_envs.datasets.overcooked_2019.recorded_trajectories`."""
-    if candidate_set not in ("game", "all"):
-        raise ValueError(f"`candidate_set` must be 'game' or 'all', got {candidate_set!r}")
+    choice("candidate_set", candidate_set, ("game", "all"))
     return [
         found
         for game in games

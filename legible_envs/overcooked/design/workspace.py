@@ -25,7 +25,7 @@ from legible_envs.overcooked.scoring.scorer import OvercookedScorer
 from legible_envs.overcooked.scoring.tables import make_tables
 from legible_envs.support.validation import choice, entries, integer, real, shown
 from legible_envs.tasks import TaskGraph
-from legible_envs.workspace import Array, Workspace, as_batch, as_single
+from legible_envs.workspace import Array, Workspace, as_batch, as_single, make_workspace
 
 if TYPE_CHECKING:
     from legible_envs.rollouts.trajectory import Trajectory
@@ -415,8 +415,6 @@ class OvercookedWorkspace(Workspace):
         }
 
     def __reduce__(self) -> tuple[object, ...]:
-        from legible_envs.workspace import make_workspace
-
         return make_workspace, (self.to_config(),)
 
 

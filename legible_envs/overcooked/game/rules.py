@@ -10,11 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.errors import LayoutError
+from legible_envs.overcooked.game.vectors import POT_CELL
 from legible_envs.overcooked.layout import INGREDIENTS, OvercookedLayout
 from legible_envs.overcooked.recipes import PAPER_SOUPS, Recipe, check_recipes
 from legible_envs.support.validation import integer
 
-__all__ = ["LEGIBLE", "OVERCOOKED_AI_2019", "RULE_SETS", "GameRules", "pack_kitchen", "pack_rules"]
+__all__ = ["LEGIBLE", "OVERCOOKED_AI_2019", "RULE_SETS", "GameRules", "count_pots", "pack_kitchen", "pack_rules"]
 
 MAX_ORDERS: Final = 32
 MAX_COPIES: Final = 15
@@ -106,7 +107,6 @@ def pack_kitchen(
         LayoutError: Fewer starts than players, or more pots than ``rules`` has room for.
     """
     from legible_envs.overcooked.game.dynamics import label_regions
-    from legible_envs.overcooked.game.vectors import POT_CELL
 
     starts = layout.starts if starts is None else starts
     height, width, players, pots = (int(value) for value in rules[:4])
@@ -114,7 +114,7 @@ def pack_kitchen(
         raise LayoutError(f"expected a kitchen of shape {(height, width)}, got {layout.shape}", rule="shape")
     if len(starts) < players:
         raise LayoutError(f"{players} players need as many starts; the kitchen has {len(starts)}", rule="start")
-    found = int(np.count_nonzero(layout.cells == POT_CELL))
+    found = count_pots(layout)
     if found > pots:
         raise LayoutError(f"the kitchen has {found} pots, there is room for {pots}", rule="pots")
     cells = height * width
@@ -123,3 +123,8 @@ def pack_kitchen(
     kitchen[2 * cells :] = [row * width + col for row, col in starts[:players]]
     label_regions(kitchen, rules)
     return kitchen
+
+
+def count_pots(layout: OvercookedLayout) -> int:
+    """Number of pots in a kitchen."""
+    return int(np.count_nonzero(layout.cells == POT_CELL))

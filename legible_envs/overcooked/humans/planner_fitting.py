@@ -11,8 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.overcooked.humans.fitting import fit_rationality, goal_field, rationality_spread
-from legible_envs.overcooked.humans.kernels import GoalField
+from legible_envs.overcooked.humans.kernels import GoalField, step_probabilities
 from legible_envs.overcooked.humans.simulation import BoltzmannWalker, PlannerWalker, Walker
+from legible_envs.overcooked.layout import OvercookedLayout
 
 if TYPE_CHECKING:
     from legible_envs.rollouts.trajectory import Trajectory
@@ -148,8 +149,6 @@ def best_slip(planned: Floats, slipped: Floats) -> tuple[float, float]:
 
 def _prepared(trajectories: Sequence[Trajectory]) -> Recorded:
     """Paths as cell numbers, the costs to go to each goal, and the participant."""
-    from legible_envs.overcooked.layout import OvercookedLayout
-
     fields: dict[tuple[object, str], GoalField] = {}
     found: Recorded = []
     for trajectory in trajectories:
@@ -165,8 +164,6 @@ def _prepared(trajectories: Sequence[Trajectory]) -> Recorded:
 
 def _step_probabilities(recorded: Recorded, params: Floats) -> tuple[Floats, Floats]:
     """``(m,)`` each of all steps of all trajectories, as :func:`step_probabilities` gives them."""
-    from legible_envs.overcooked.humans.kernels import step_probabilities
-
     ends = np.cumsum([0, *(len(path) - 1 for path, *_ in recorded)])
     planned, slipped = np.empty(ends[-1]), np.empty(ends[-1])
     for (path, field, _), a, b in zip(recorded, ends, ends[1:], strict=False):
@@ -178,9 +175,10 @@ def draw_person(people: Mapping[str, Any]) -> Callable[..., Walker]:
     """A function that draws participants for :func:`~legible_envs.overcooked.humans.simulate_participants`.
 
     Args:
-        people: Plain data: ``walker`` and its parameters, as :func:`benchmarks.experiments.overcooked.sweep.people_of`
-            makes them. Boltzmann walkers have lognormal rationality; planners the cost of turning and the slips of one
-            recorded participant each, drawn at random.
+        people: Plain data: ``walker``, ``"boltzmann"`` or ``"planner"``, and its parameters. Boltzmann walkers have
+            lognormal rationality (``rationality``, ``spread``, ``preference``); planners share ``depth``, ``recency``,
+            ``fade`` and ``preference``, and have the ``(turn_cost, slip)`` of one recorded participant each, drawn at
+            random from ``people``.
     """
     kind, preference = people["walker"], float(people["preference"])
     if kind == "boltzmann":

@@ -14,7 +14,7 @@ ticks of a trajectory are moves (23 %), turns on the spot (6 %), idle (63 %) and
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -176,7 +176,10 @@ class PlannerWalker(Walker):
 
 
 PopulationName = Literal["boltzmann", "planner"]
-_POPULATIONS: Final[dict[str, Any]] = {"boltzmann": BoltzmannWalker.draw, "planner": PlannerWalker.draw}
+_POPULATIONS: Final[Mapping[str, Callable[..., Walker]]] = {
+    "boltzmann": BoltzmannWalker.draw,
+    "planner": PlannerWalker.draw,
+}
 
 
 def simulate_participants(
@@ -236,7 +239,12 @@ def simulate_participants(
 
 
 def _execute(
-    layout: OvercookedLayout, task: TaskGraph, person: Walker, clock: int, rng: np.random.Generator, labels: Any
+    layout: OvercookedLayout,
+    task: TaskGraph,
+    person: Walker,
+    clock: int,
+    rng: np.random.Generator,
+    labels: Mapping[str, Any],
 ) -> tuple[list[Trajectory], int]:
     """One task execution: its trajectories, and the tick at its end."""
     places = layout.named(task.start)

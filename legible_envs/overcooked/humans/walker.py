@@ -144,6 +144,19 @@ class Walker(ABC):
         """When ticks end."""
         return np.asarray(ticks * self.tick, dtype=np.float64)
 
+    def leg(
+        self, layout: OvercookedLayout, cell: Cell, start: str, goal: str, rng: np.random.Generator
+    ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+        """``(T, 2)`` cells from a floor cell into a station, and ``(T,)`` ticks, from a person who faces ``start``."""
+        field = self._field(layout, goal)
+        path = self._walk(field, cell, rng)
+        row, col = layout.stations[start]
+        around = [neighbour(int(path[0]), direction, field.height, field.width) for direction in range(4)]
+        facing = around.index(row * field.width + col)
+        ticks = np.empty(len(path), dtype=np.int64)
+        sample_times(path, facing, field, self.idle, self.turn, rng, ticks)
+        return np.column_stack(np.divmod(path, field.width)), ticks
+
     def _field(self, layout: OvercookedLayout, goal: str) -> GoalField:
         if goal not in layout.stations:
             raise LayoutError(f"no station {goal!r}; this kitchen has {list(layout.stations)}", rule="station")
@@ -169,19 +182,6 @@ class Walker(ABC):
         if length == 0:
             raise RuntimeError(f"{self!r} did not find the goal within {LONGEST:,} steps")
         return path[:length].copy()
-
-    def leg(
-        self, layout: OvercookedLayout, cell: Cell, start: str, goal: str, rng: np.random.Generator
-    ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-        """``(T, 2)`` cells from a floor cell into a station, and ``(T,)`` ticks, from a person who faces ``start``."""
-        field = self._field(layout, goal)
-        path = self._walk(field, cell, rng)
-        row, col = layout.stations[start]
-        around = [neighbour(int(path[0]), direction, field.height, field.width) for direction in range(4)]
-        facing = around.index(row * field.width + col)
-        ticks = np.empty(len(path), dtype=np.int64)
-        sample_times(path, facing, field, self.idle, self.turn, rng, ticks)
-        return np.column_stack(np.divmod(path, field.width)), ticks
 
     def __reduce__(self) -> tuple[object, ...]:
         return _rebuild, (type(self), {key: getattr(self, key) for key in self._parameters()})

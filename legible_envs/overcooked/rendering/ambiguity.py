@@ -10,17 +10,17 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from legible_envs.drawing.canvas import Canvas, Image, Sprite, mix, paste, rgb, text_sprite
+from legible_envs.drawing.canvas import Canvas, Image, Sprite, heat_colour, paste, rgb, text_sprite
 from legible_envs.drawing.sheets import banner, check_tile
-from legible_envs.overcooked.grid import Cell
+from legible_envs.overcooked.grid import NEIGHBOURS, Cell
 from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.overcooked.rendering.board import board_of
-from legible_envs.overcooked.rendering.palette import HEAT, PALETTE, PLAYER_COLOURS
+from legible_envs.overcooked.rendering.palette import PALETTE, PLAYER_COLOURS
 
 __all__ = ["draw_ambiguity"]
 
 _SHADES: Final = 64
-_MOVES: Final = {(-1, 0): 0, (1, 0): 1, (0, 1): 2, (0, -1): 3}
+_MOVES: Final = {step: direction for direction, step in enumerate(NEIGHBOURS)}
 
 
 def draw_ambiguity(
@@ -70,16 +70,10 @@ def draw_ambiguity(
     return banner(image, title, tile) if title else image
 
 
-def _heat_colour(value: float) -> str:
-    place = value * (len(HEAT) - 1)
-    below = min(int(place), len(HEAT) - 2)
-    return mix(HEAT[below], HEAT[below + 1], place - below)
-
-
 @lru_cache(maxsize=256)
 def _heat_sprite(shade: int, tile: int) -> Sprite:
     canvas, value = Canvas(tile), shade / _SHADES
-    canvas.rectangle(0.06, 0.06, 0.88, 0.88, _heat_colour(value), 0.86, radius=0.14)
+    canvas.rectangle(0.06, 0.06, 0.88, 0.88, heat_colour(value), 0.86, radius=0.14)
     return canvas.sprite()
 
 
@@ -125,7 +119,7 @@ def _path_sprite(came: int | None, goes: int | None, colour: str, aside: float, 
         if came is None:
             canvas.circle(*centre, width * 1.1, ink)
     if goes is None and came is not None:
-        dx, dy = {0: (0, -1), 1: (0, 1), 2: (1, 0), 3: (-1, 0)}[came]
+        dy, dx = NEIGHBOURS[came]
         for size, ink in ((0.19, "#ffffff"), (0.14, colour)):
             tip = (middle + dx * size, middle + dy * size)
             canvas.polygon(
@@ -146,7 +140,7 @@ def _legend(width: int, ends: tuple[str, str], names: Sequence[str], tile: int) 
         paste(rows, high, (height - len(high.colour)) // 2 + 1, right + pad)
     else:
         left, right = pad, max(pad + 1, width - pad)
-    ramp = np.array([rgb(_heat_colour(value)) for value in np.linspace(0, 1, right - left)], np.uint8)
+    ramp = np.array([rgb(heat_colour(value)) for value in np.linspace(0, 1, right - left)], np.uint8)
     rows[height // 3 : height - height // 3, left:right] = ramp
     for number, name in enumerate(names):
         top = height * (number + 1)

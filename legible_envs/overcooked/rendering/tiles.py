@@ -7,6 +7,7 @@ from functools import lru_cache
 from typing import Final
 
 from legible_envs.drawing.canvas import Canvas, Sprite, mix
+from legible_envs.overcooked.grid import NEIGHBOURS
 from legible_envs.overcooked.layout import COUNTER, FLOOR, OBSTACLE, STATION_TYPES
 from legible_envs.overcooked.rendering.food import draw_ingredient
 from legible_envs.overcooked.rendering.palette import PALETTE
@@ -139,7 +140,7 @@ def _serving(canvas: Canvas, out: int) -> None:
     canvas.rectangle(0.04, 0.06, 0.92, 0.76, PALETTE["shadow"], 0.3, radius=0.08)
     canvas.rectangle(0.04, 0.03, 0.92, 0.76, mix(green, "#0c3424", 0.45), radius=0.08)
     canvas.rectangle(0.07, 0.06, 0.86, 0.69, green, radius=0.06)
-    dx, dy = ((0, -1), (0, 1), (1, 0), (-1, 0))[out]
+    dy, dx = NEIGHBOURS[out]
     for ahead in (0.16, 0.29):
         x, y = 0.5 + dx * (ahead + 0.06), 0.405 + dy * ahead * 0.88
         wing = [(x - dx * 0.1 + side * dy * 0.24, y - dy * 0.1 + side * dx * 0.24) for side in (-1, 1)]

@@ -95,7 +95,7 @@ class DifferentiableTable:
         i, j = np.triu_indices(len(movable), 1)
         counts = np.array(movable)[i] | np.array(movable)[j]
         self._pairs = i[counts], j[counts]
-        self._template = np.array([*(o.at for o in layout.objects), *layout.table.starts.values()])
+        self._template = layout.points
 
     @property
     def home(self) -> Floats:

@@ -96,10 +96,10 @@ class DesignRules:
 
     def _arrays(self) -> Rules:
         layout = self.task.layout
-        points = [*layout.goals, *layout.table.starts]
+        places = layout.place_names
         length, width = self.obstacle_size
         return Rules(
-            template=np.array([*(o.at for o in layout.objects), *layout.table.starts.values()]),
+            template=layout.points,
             movable=np.array(self.movable, dtype=np.int64),
             fixed=np.array([not (o.movable and self.moves_objects) for o in layout.objects]),
             shapes=np.array([_shape(o.angle, *o.size) for o in layout.objects]),
@@ -115,8 +115,8 @@ class DesignRules:
             on_table=self.obstacles_on_table,
             apart=self.obstacles_apart,
             slots=np.array([(*at, *_shape(o.angle, *o.size)) for _, at, o in self.slots]).reshape(-1, 6),
-            reach_from=np.array([points.index(start) for start, _ in self.reaches], dtype=np.int64),
-            reach_to=np.array([points.index(goal) for _, goal in self.reaches], dtype=np.int64),
+            reach_from=np.array([places.index(start) for start, _ in self.reaches], dtype=np.int64),
+            reach_to=np.array([places.index(goal) for _, goal in self.reaches], dtype=np.int64),
             reach_weight=np.array(list(self.reaches.values())),
         )
 

@@ -11,7 +11,7 @@ from typing import Any, ClassVar, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from legible_envs.errors import LayoutError, TaskError
+from legible_envs.errors import LayoutError
 from legible_envs.observer import ObserverModel, Ties
 from legible_envs.rollouts.trajectory import Trajectory
 from legible_envs.support.validation import choice, entries, flag, real, shown
@@ -23,8 +23,8 @@ from legible_envs.tabletop.layout import MAX_OBSTACLES, TabletopLayout
 from legible_envs.tabletop.objects import OBSTACLE_SIZE, numbers
 from legible_envs.tabletop.scoring.explanation import summarise
 from legible_envs.tabletop.scoring.scorer import TableScores, TabletopScorer
-from legible_envs.tabletop.task import TabletopTask, task_names
-from legible_envs.workspace import Array, ObjectiveName, Workspace, as_batch, as_single
+from legible_envs.tabletop.task import TabletopTask, read_task, task_names
+from legible_envs.workspace import Array, ObjectiveName, Workspace, as_batch, as_single, make_workspace
 
 __all__ = ["DesignMode", "TabletopWorkspace"]
 
@@ -125,10 +125,8 @@ class TabletopWorkspace(Workspace):
         step_sd: float = 0.07,
         start_from: TabletopLayout | Mapping[str, Any] | None = None,
     ) -> None:
-        self.task = _as_task(task)
-        is_shipped = self.task.name in task_names() and (
-            task == self.task.name or _as_task(self.task.name) == self.task
-        )
+        self.task = read_task(task)
+        is_shipped = self.task.name in task_names() and TabletopTask.named(self.task.name) == self.task
         self._task_config = self.task.name if is_shipped else self.task.to_dict()
         self.condition: DesignMode = choice("condition", condition, get_args(DesignMode))
         self.scorer = TabletopScorer(
@@ -482,16 +480,4 @@ class TabletopWorkspace(Workspace):
         }
 
     def __reduce__(self) -> tuple[object, ...]:
-        from legible_envs.workspace import make_workspace
-
         return make_workspace, (self.to_config(),)
-
-
-def _as_task(task: TabletopTask | Mapping[str, Any] | str) -> TabletopTask:
-    if isinstance(task, TabletopTask):
-        return task
-    if isinstance(task, Mapping):
-        return TabletopTask.from_dict(task)
-    if not isinstance(task, str):
-        raise TaskError(f"`task` must be a TabletopTask, a name, a path or a mapping, got {shown(task)}")
-    return TabletopTask.from_yaml(task) if task.endswith((".yaml", ".yml")) else TabletopTask.named(task)

@@ -61,10 +61,14 @@ class ShortestPaths:
         path_tables(self.boxes, self.corners, count, self._between, self.goals, self._lengths)
 
     @classmethod
-    def of(cls, layout: TabletopLayout) -> ShortestPaths:
-        """The paths to all objects of a layout."""
+    def of(
+        cls, layout: TabletopLayout, goals: npt.ArrayLike | None = None, names: tuple[str, ...] | None = None
+    ) -> ShortestPaths:
+        """The paths on a layout, to given points; to all its objects, by their names, if None."""
+        if goals is None:
+            goals, names = layout.centres, layout.goals
         rows = [(*o.at, o.angle, *o.size) for o in layout.obstacles]
-        return cls(layout.centres, rows, layout.table.hand, layout.table.size, layout.goals)
+        return cls(goals, rows, layout.table.hand, layout.table.size, names)
 
     @property
     def tables(self) -> Floats:

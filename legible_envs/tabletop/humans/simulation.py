@@ -103,9 +103,8 @@ class Surface:
         first = paths.nearest_free([start])[0]
         if isinstance(goal, str) and goal in self.layout.goals:
             return paths.polyline(first, goal)
-        rows = [(*o.at, o.angle, *o.size) for o in self.layout.obstacles]
         target = paths.nearest_free([self.place(goal, "the goal")])
-        return ShortestPaths(target, rows, self.hand, self.layout.table.size).polyline(first, 0)
+        return ShortestPaths.of(self.layout, target).polyline(first, 0)
 
 
 def sample_person(rng: np.random.Generator, population: ReachModel | None = None) -> Person:
@@ -400,7 +399,7 @@ def _checked_rate(rate: float) -> float:
 def _checked_task(task: TabletopTask | None, layout: TabletopLayout) -> TabletopTask:
     if task is None:
         return TabletopTask.for_layout(layout)
-    known = {*layout.goals, *layout.table.starts}
+    known = layout.place_names
     missing = [place for place in task.graph.places if place not in known]
     if missing:
         raise LayoutError(

@@ -156,8 +156,7 @@ def _paths_to(
         raise LayoutError(f"`positions` must be {len(goals)} finite points, got {positions!r}", rule="point")
     if np.array_equal(points, layout.centres[rows]):
         return layout.paths, rows
-    obstacles = [(*o.at, o.angle, *o.size) for o in layout.obstacles]
-    return ShortestPaths(points, obstacles, layout.table.hand, layout.table.size, goals), list(range(len(goals)))
+    return ShortestPaths.of(layout, points, goals), list(range(len(goals)))
 
 
 def _checked_point(point: npt.ArrayLike) -> tuple[float, float]:

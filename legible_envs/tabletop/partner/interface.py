@@ -14,7 +14,17 @@ if TYPE_CHECKING:
     from legible_envs.tabletop.layout import TabletopLayout
     from legible_envs.tabletop.task import TabletopTask
 
-__all__ = ["Command", "Floats", "GoalStream", "Partner", "PrefixPredictor", "Senses", "State", "StreamingPredictor"]
+__all__ = [
+    "Command",
+    "Floats",
+    "GoalStream",
+    "Partner",
+    "PrefixPredictor",
+    "Senses",
+    "State",
+    "StreamingPredictor",
+    "gripper_home",
+]
 
 Floats = npt.NDArray[np.float64]
 State = Literal["wait", "approach", "grasp", "carry", "place"]
@@ -94,6 +104,12 @@ class Partner(Protocol):
     def step(self, senses: Senses) -> Command:
         """The command until the next call."""
         ...
+
+
+def gripper_home(layout: TabletopLayout) -> tuple[float, float]:
+    """Where a gripper begins unless a robot says otherwise: the middle of the table's far side, 5 cm from the edge."""
+    width, depth = layout.table.size
+    return width / 2, depth - 0.05
 
 
 class GoalStream(Protocol):

@@ -16,7 +16,7 @@ import numpy as np
 from legible_envs.support.validation import real
 from legible_envs.tabletop.objects import Point, point
 from legible_envs.tabletop.partner.intent import IntentObserver
-from legible_envs.tabletop.partner.interface import Command, Floats, Senses, State
+from legible_envs.tabletop.partner.interface import Command, Floats, Senses, State, gripper_home
 from legible_envs.tabletop.partner.steering import Steering
 
 if TYPE_CHECKING:
@@ -136,7 +136,7 @@ class RobotPartner:
             ``(2,)`` where the gripper is at the beginning.
         """
         width, depth = layout.table.size
-        self._home = (width / 2, depth - 0.05) if self.home is None else self.home
+        self._home = gripper_home(layout) if self.home is None else self.home
         if not (0 <= self._home[0] <= width and 0 <= self._home[1] <= depth):
             raise ValueError(f"the robot's `home` at {self._home} is off the table of {width:g} x {depth:g} m")
         self._row = {name: row for row, name in enumerate(layout.goals)}

@@ -15,7 +15,7 @@ from legible_envs.support.validation import shown
 from legible_envs.tabletop.game.game import DT, RATE, TableGame
 from legible_envs.tabletop.partner.fluency import TeamMetrics, tick_of
 from legible_envs.tabletop.partner.intent import IntentObserver
-from legible_envs.tabletop.partner.interface import Command, Partner, Senses
+from legible_envs.tabletop.partner.interface import Command, Partner, Senses, gripper_home
 from legible_envs.tabletop.partner.robot import RobotPartner
 
 __all__ = ["GRIPPER_SPEED", "MEASURES", "Team", "make_partner"]
@@ -115,7 +115,7 @@ class Team:
             self.observer.reset(game.layout, game.task)
         if self.partner is not None:
             at = self.partner.reset(game.layout, game.task, rng)
-            self.gripper = self._home(game) if at is None else _pair(at, "what a partner's `reset` returns")
+            self.gripper = gripper_home(game.layout) if at is None else _pair(at, "what a partner's `reset` returns")
             self.velocity = (0.0, 0.0)
             self._metrics = TeamMetrics()
         self.sense(game)
@@ -210,11 +210,6 @@ class Team:
             gripper=np.array(gripper),
             holding=game.names[gripped] if gripped >= 0 else None,
         )
-
-    @staticmethod
-    def _home(game: TableGame) -> tuple[float, float]:
-        width, depth = game.layout.table.size
-        return width / 2, depth - 0.05
 
 
 def _pair(value: npt.ArrayLike, what: str) -> tuple[float, float]:

@@ -12,10 +12,10 @@ __all__ = ["GLYPHS", "draw_glyph", "initial"]
 Outline = list[tuple[float, float]]
 
 
-def _regular(corners: int, radius: float, turn: float = 0.0, dip: float = 1.0) -> Outline:
+def _regular(corners: int, radius: float, dip: float = 1.0) -> Outline:
     """A polygon round the origin, its first corner on top; every other radius shrunk by ``dip``."""
     count = corners if dip == 1.0 else 2 * corners
-    angles = [2 * math.pi * (i / count + turn) for i in range(count)]
+    angles = [2 * math.pi * (i / count) for i in range(count)]
     radii = [radius if i % 2 == 0 else radius * dip for i in range(count)] if dip != 1.0 else [radius] * count
     return [(r * math.sin(a), -r * math.cos(a)) for r, a in zip(radii, angles, strict=True)]
 

@@ -9,8 +9,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from legible_envs.drawing.canvas import Canvas, Image, mix, paste, rgb, text_sprite
-from legible_envs.drawing.palette import HEAT
+from legible_envs.drawing.canvas import Canvas, Image, heat_colour, paste, rgb, text_sprite
 from legible_envs.drawing.sheets import banner
 from legible_envs.tabletop.layout import TabletopLayout
 from legible_envs.tabletop.rendering.ambiguity import ambiguous_reaches
@@ -20,7 +19,7 @@ from legible_envs.tabletop.rendering.palette import TABLE
 from legible_envs.tabletop.rendering.surface import surface_of
 from legible_envs.tabletop.task import TabletopTask
 
-__all__ = ["draw_ambiguity_scale", "draw_table", "heat_colour"]
+__all__ = ["draw_ambiguity_scale", "draw_table"]
 
 Floats = npt.NDArray[np.float64]
 _PIECES: Final = 48
@@ -93,13 +92,6 @@ def _draw_paths(image: Image, frame: Frame, layout: TabletopLayout, starts: list
         for line in lines:
             canvas.stroke(line, width * max(1.0, frame.width / 640) / frame.width, ink)
     paste(image, canvas.sprite(), 0, 0)
-
-
-def heat_colour(value: float) -> str:
-    """The colour of a value from 0 to 1."""
-    place = min(max(value, 0.0), 1.0) * (len(HEAT) - 1)
-    below = min(int(place), len(HEAT) - 2)
-    return mix(HEAT[below], HEAT[below + 1], place - below)
 
 
 def _draw_ambiguity(image: Image, frame: Frame, layout: TabletopLayout, task: TabletopTask, beta: float) -> None:

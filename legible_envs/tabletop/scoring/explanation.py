@@ -38,8 +38,7 @@ def check_points(layout: TabletopLayout, task: TabletopTask) -> None:
     Raises:
         LayoutError: It has others.
     """
-    expected = (*task.layout.goals, *task.layout.table.starts)
-    got = (*layout.goals, *layout.table.starts)
+    expected, got = task.layout.place_names, layout.place_names
     if got != expected:
         raise LayoutError(f"task {task.name!r} is about {list(expected)}, the layout has {list(got)}", rule="object")
 
@@ -50,10 +49,8 @@ def path_lengths(layout: TabletopLayout, pairs: Sequence[tuple[str, str]]) -> di
     Raises:
         LayoutError: There is no path; the message names both places.
     """
-    names = (*layout.goals, *layout.table.starts)
-    places = np.array([layout.place(name) for name in names])
-    obstacles = [(*o.at, o.angle, *o.size) for o in layout.obstacles]
-    metres = ShortestPaths(places, obstacles, layout.table.hand, layout.table.size, names).lengths(places)
+    names, places = layout.place_names, layout.points
+    metres = ShortestPaths.of(layout, places, names).lengths(places)
     lengths = {(a, b): float(metres[names.index(a), names.index(b)]) for a, b in pairs}
     for (a, b), length in lengths.items():
         if math.isinf(length):

@@ -85,14 +85,10 @@ class TabletopScorer:
         self.obstacle_size = (length, width)
         layout = self.task.layout
         self._movable = np.flatnonzero([o.movable for o in layout.objects]).astype(np.int64)
-        self._template = self._points(layout)
+        self._template = layout.points
         self.genome_size = 2 * len(self._movable) + 4 * max_obstacles
         self.best_possible = sum(stage.weight * len(stage.goals) for stage in self.task.graph.stages())
-        self.tables = make_tables(self.task.graph, (*layout.goals, *layout.table.starts), observer)
-
-    @staticmethod
-    def _points(layout: TabletopLayout) -> Floats:
-        return np.array([*(o.at for o in layout.objects), *layout.table.starts.values()])
+        self.tables = make_tables(self.task.graph, layout.place_names, observer)
 
     def score_genomes(self, genomes: Any) -> TableScores:
         """Scores of ``(n, d)`` genomes; rows that are not finite score NaN.
@@ -130,7 +126,7 @@ class TabletopScorer:
             explanation.check_points(layout, self.task)
             boxes = layout.paths.boxes
             scratch = make_scratch(len(boxes), self.tables)
-            score_table(self._points(layout), boxes, layout.table.size, self.tables, scratch, row)
+            score_table(layout.points, boxes, layout.table.size, self.tables, scratch, row)
         return TableScores(*scores.T)
 
     def score_layout(self, layout: TabletopLayout) -> dict[str, Any]:

@@ -21,17 +21,10 @@ from legible_envs.overcooked.env import OvercookedEnv
 from legible_envs.overcooked.game.observations import GRID_CHANNELS, NUM_FEATURES
 from legible_envs.overcooked.layouts import read_layout
 from legible_envs.overcooked.policies import ScriptedPlayer
+from tests.legible_envs.environment_cases import KITCHEN
 from tests.oracles.kitchen_oracle import any_kitchen
 
 NAME = "LegibleOvercooked-v0"
-KITCHEN = """\
-XXTXOXX
-C     D
-X  V  X
-F 1   P
-X     X
-X     P
-XXXSXXX"""
 
 
 # -- text and keys ----------------------------------------------------------------------------------------

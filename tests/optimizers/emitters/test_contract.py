@@ -17,7 +17,6 @@ from optimizers import (
     MutationEmitter,
     NoveltyLocalCompetitionEmitter,
     RandomWorkspaceEmitter,
-    WorkspaceEmitter,
     check_emitter,
     list_emitters,
     make_archive,
@@ -27,31 +26,11 @@ from optimizers import (
 from optimizers.emitters.adapter import GenomeAdapter
 from optimizers.evaluator import Evaluator
 from tests.support.shelf_workspace import ShelfWorkspace
+from tests.support.third_party_emitters import Shift, reshuffle
 from tests.support.valley_workspace import Valley
 
 SHELF, VALLEY = ShelfWorkspace(), Valley()
 KITCHEN = OvercookedWorkspace(shape=(5, 5), prefix="sum")
-
-
-class Shift(WorkspaceEmitter):
-    """A third-party emitter: some elites, with one gene shifted; often not valid."""
-
-    emits_valid = False
-
-    def __init__(self, archive, workspace, *, seed, step=1):
-        super().__init__(archive, workspace, seed=seed)
-        self.step = step
-
-    def ask(self):
-        genomes = self.archive.data("solution").astype(int)
-        genomes = genomes[self._rng.integers(len(genomes), size=40)]
-        genomes[np.arange(40), self._rng.integers(genomes.shape[1], size=40)] += self.step
-        return genomes
-
-
-def reshuffle(archive, workspace, rng, size=30):
-    """A proposing function: random layouts."""
-    return workspace.sample(size, rng)
 
 
 BUILT_IN = ["annealing", "cma-mae", "cma-me", "differential-evolution", "improve", "mutation", "nslc", "random"]

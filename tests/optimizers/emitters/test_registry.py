@@ -8,7 +8,6 @@ import pytest
 from legible_envs.overcooked import OvercookedWorkspace
 from optimizers import (
     EmitterError,
-    WorkspaceEmitter,
     check_emitter,
     list_emitters,
     make_archive,
@@ -18,33 +17,12 @@ from optimizers import (
 )
 from optimizers.archives import archive_arrays
 from tests.support.shelf_workspace import ShelfWorkspace
+from tests.support.third_party_emitters import Shift, reshuffle
 
 pytestmark = pytest.mark.usefixtures("clean_registries")
 
 SHELF = ShelfWorkspace()
 KITCHEN = OvercookedWorkspace(shape=(5, 5))
-
-
-class Shift(WorkspaceEmitter):
-    """A well-behaved third-party emitter: some elites, with one gene shifted."""
-
-    emits_valid = False
-
-    def __init__(self, archive, workspace, *, seed, step=1):
-        super().__init__(archive, workspace, seed=seed)
-        self.step = step
-        self.settings = {"step": step}
-
-    def ask(self):
-        genomes = self.archive.data("solution").astype(int)
-        genomes = genomes[self._rng.integers(len(genomes), size=40)]
-        genomes[np.arange(40), self._rng.integers(genomes.shape[1], size=40)] += self.step
-        return genomes
-
-
-def reshuffle(archive, workspace, rng, size=30):
-    """A proposing function: random layouts."""
-    return workspace.sample(size, rng)
 
 
 # -- the example package -----------------------------------------------------------------------------------------------
@@ -73,14 +51,14 @@ def test_the_example_searches_beside_another(workspace, tmp_path):
 
 def test_a_registered_emitter_is_known_by_name_with_its_options():
     register_emitter("shift", Shift)
-    assert list_emitters()["shift"].target == f"{__name__}:Shift"
+    assert list_emitters()["shift"].target == f"{Shift.__module__}:Shift"
     check_emitter("shift", SHELF)
     result = search(SHELF, emitter="shift", emitter_options={"step": 2}, evaluations=2000)
     assert result.config["emitter"] == {"name": "shift", "options": {"step": 2}, "settings": {"step": 2}}
     with pytest.raises(EmitterError, match="'shift' is taken"):
         register_emitter("shift", Shift)
     register_emitter("shift", reshuffle, overwrite=True)
-    assert list_emitters()["shift"].target == f"{__name__}:reshuffle"
+    assert list_emitters()["shift"].target == f"{reshuffle.__module__}:reshuffle"
 
 
 @pytest.mark.parametrize(
