@@ -73,7 +73,7 @@ def run_search(domain: str, out: Path, settings: Mapping[str, Any], given: Colle
         settings = _continued(before, settings, given)
     config |= presenter.design(settings) | dict(settings.get("assigned", ()))
     parts = presenter.parts(config, settings, out)
-    results = [_search_part(domain, presenter, part, settings, out) for part in parts]
+    results = [_search_part(domain, part, settings, out) for part in parts]
     _tell(presenter, results[0], parts)
 
 
@@ -98,7 +98,7 @@ def _continued(before: Mapping[str, Any], settings: Mapping[str, Any], given: Co
     return {"evaluations": None, "iterations": None, **own, **kept}
 
 
-def _search_part(domain: str, presenter: Presenter, part: Part, settings: Mapping[str, Any], out: Path) -> SearchResult:
+def _search_part(domain: str, part: Part, settings: Mapping[str, Any], out: Path) -> SearchResult:
     """One search of one folder."""
     from optimizers import SearchInterrupted, search
 
