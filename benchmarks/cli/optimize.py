@@ -12,7 +12,7 @@ import click
 
 from benchmarks.console import number
 from benchmarks.presenters.base import Part, Presenter, summary_of
-from benchmarks.presenters.registry import presenter_of, usable_presenters, workspace_of
+from benchmarks.presenters.registry import presenter_of, presenter_of_run, usable_presenters
 from legible_envs.workspace import workspace_class
 from optimizers.errors import SearchError
 from optimizers.runs.folder import RunFolder, is_run_folder
@@ -161,9 +161,9 @@ def write_pictures(folder: Path) -> dict[str, Path]:
     from optimizers import load_run
 
     run = load_run(folder)
-    pictures = {"picture": write_best_image(folder), "panels": presenter_of(workspace_of(run)).write_panels(run)}
+    pictures = {"picture": write_best_image(run), "panels": presenter_of_run(run).write_panels(run)}
     written = {name: path for name, path in pictures.items() if path is not None}
-    return {**written, "report": write_report(folder)}
+    return {**written, "report": write_report(run)}
 
 
 def emitter_rows() -> list[dict[str, Any]]:
