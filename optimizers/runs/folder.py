@@ -219,4 +219,3 @@ def _as_csv(rows: Iterable[Mapping[str, Any]]) -> str:
     for row in rows:
         writer.writerow(["" if row[name] is None else row[name] for name in COLUMNS])
     return stream.getvalue()
-
