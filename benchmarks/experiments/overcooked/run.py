@@ -42,7 +42,7 @@ def reproduce(
     settings: Settings | None = None,
     **how: Unpack[RunOptions],
 ) -> None:
-    """Run what is not there yet, and write result files; tables and figures are made of them by ``sections``.
+    """Run the trials that have no result yet, and write result files; ``sections`` makes tables and figures of them.
 
     Args:
         folder: Folder of the experiment. ``layouts.csv``, ``people.csv``, ``readings.csv`` and ``curves.csv`` hold the
