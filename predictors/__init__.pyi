@@ -1,4 +1,4 @@
-from .base import GoalPredictor
+from .base import CandidatePredictor, GoalPredictor
 from .evaluation.decisions import ThresholdDecision
 from .grid.baselines import GridLogistic, GridNeighbours, GridNGram
 from .grid.bayesian import BayesianGoalPredictor
@@ -13,6 +13,7 @@ from .uniform import UniformPredictor
 
 __all__ = [
     "BayesianGoalPredictor",
+    "CandidatePredictor",
     "GoalPredictor",
     "GridLogistic",
     "GridNGram",

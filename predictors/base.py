@@ -4,7 +4,8 @@ A sample is a :class:`~legible_envs.rollouts.Trajectory` (a complete one, or a p
 probabilities are ``classes_``, and each row is zero outside the trajectory's own candidates.
 
 To write a predictor, subclass :class:`GoalPredictor`, take parameters in ``__init__`` and store them unchanged, and
-define ``predict_proba``; define ``fit`` if something is learned (call ``super().fit(X)``, which learns ``classes_``).
+define ``predict_proba`` (or subclass :class:`CandidatePredictor` and define the probabilities of one trajectory);
+define ``fit`` if something is learned (call ``super().fit(X)``, which learns ``classes_``).
 :func:`check_trajectories` and :meth:`GoalPredictor.candidate_columns` help with the input;
 :func:`predictors.registry.check_predictor` says what a predictor gets wrong.
 """
@@ -15,7 +16,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Final, Literal, Self
+from typing import Any, Final, Literal, Self, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -23,10 +24,12 @@ from sklearn.base import BaseEstimator
 from sklearn.exceptions import NotFittedError
 
 from legible_envs.rollouts.trajectory import Cut, Trajectory
+from legible_envs.support.validation import choice
 
 __all__ = [
     "FRACTIONS",
     "TIE_TOLERANCE",
+    "CandidatePredictor",
     "GoalPredictor",
     "GoalStream",
     "TieCredit",
@@ -202,6 +205,23 @@ class GoalPredictor(BaseEstimator, ABC):
         return columns
 
 
+class CandidatePredictor(GoalPredictor):
+    """A predictor that takes one trajectory at a time; subclasses define ``candidate_probabilities``."""
+
+    @abstractmethod
+    def candidate_probabilities(self, trajectory: Trajectory) -> npt.NDArray[np.float64]:
+        """``(len(trajectory.candidates),)`` probabilities in the order of the candidates."""
+
+    def predict_proba(self, X: Sequence[Trajectory]) -> npt.NDArray[np.float64]:
+        """See :meth:`GoalPredictor.predict_proba`."""
+        trajectories = check_trajectories(X)
+        columns = [self.candidate_columns(trajectory) for trajectory in trajectories]
+        probabilities = np.zeros((len(trajectories), len(self.classes_)))
+        for row, trajectory in enumerate(trajectories):
+            probabilities[row, columns[row]] = self.candidate_probabilities(trajectory)
+        return probabilities
+
+
 def check_trajectories(X: Sequence[Trajectory]) -> list[Trajectory]:
     """The samples as a list.
 
@@ -231,8 +251,7 @@ def correctness(
     Returns:
         ``(n,)`` or ``(n, F)``.
     """
-    if ties not in ("fractional", "strict"):
-        raise ValueError(f"`ties` must be 'fractional' or 'strict', got {ties!r}")
+    choice("ties", ties, get_args(TieCredit))
     top = probabilities >= probabilities.max(axis=-1, keepdims=True) - TIE_TOLERANCE
     index = np.asarray(goals).reshape(-1, *(1,) * (probabilities.ndim - 1))
     is_top = np.take_along_axis(top, index, axis=-1)[..., 0]

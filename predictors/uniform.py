@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import Trajectory
-from predictors.base import GoalPredictor, check_trajectories
+from predictors.base import CandidatePredictor
 
 __all__ = ["UniformPredictor"]
 
 
-class UniformPredictor(GoalPredictor):
+class UniformPredictor(CandidatePredictor):
     """Gives every candidate the same probability, before and after anything is observed.
 
     It predicts at chance level in kitchens and on tables. A robot that is given it acts only where its partner has no
@@ -30,11 +28,6 @@ class UniformPredictor(GoalPredictor):
         [[0.5, 0.5]]
     """
 
-    def predict_proba(self, X: Sequence[Trajectory]) -> npt.NDArray[np.float64]:
-        """``(n, K)``: ``1 / len(candidates)`` for each candidate of a trajectory."""
-        trajectories = check_trajectories(X)
-        columns = [self.candidate_columns(trajectory) for trajectory in trajectories]
-        probabilities = np.zeros((len(trajectories), len(self.classes_)))
-        for row, candidates in zip(probabilities, columns, strict=True):
-            row[candidates] = 1.0 / len(candidates)
-        return probabilities
+    def candidate_probabilities(self, trajectory: Trajectory) -> npt.NDArray[np.float64]:
+        """``1 / len(candidates)`` for each candidate of the trajectory."""
+        return np.full(len(trajectory.candidates), 1.0 / len(trajectory.candidates))

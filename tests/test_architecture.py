@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib.util
+import shutil
+import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -87,3 +89,20 @@ def test_every_room_says_in_a_sentence_what_is_in_it():
         for package in row:
             for module, _ in page._rooms_in(package):
                 assert page.sentence(module).endswith((".", "?")), module
+
+
+def test_every_folder_of_modules_is_a_package():
+    folders = {path.parent for name in PACKAGES for path in (ROOT / name).rglob("*.py")}
+    assert sorted(str(folder) for folder in folders if not (folder / "__init__.py").exists()) == []
+
+
+def test_no_source_is_ignored():
+    """What ``.gitignore`` names is in no clone and in no wheel: tracked files, too, are left out of the latter."""
+    git = shutil.which("git")
+    if git is None or not (ROOT / ".git").exists():
+        pytest.skip("needs git and a clone")
+    paths = [path for name in (*PACKAGES, "tests") for path in (ROOT / name).rglob("*.py")]
+    names = "\n".join(str(path.relative_to(ROOT)) for path in paths)
+    command = [git, "check-ignore", "--no-index", "--stdin"]
+    found = subprocess.run(command, input=names, capture_output=True, text=True, cwd=ROOT, check=False)
+    assert found.stdout.splitlines() == []

@@ -25,6 +25,25 @@ def name_of(page: Path) -> str:
     return re.sub(r"\W", "_", str(page.relative_to(ROOT).with_suffix("")))
 
 
+REGISTRIES = (
+    "benchmarks.presenters.registry",
+    "legible_envs.layout_kinds",
+    "legible_envs.workspace",
+    "optimizers.emitters.registry",
+    "predictors.registry",
+)
+"""Modules that pages register something with."""
+
+
+@pytest.fixture
+def own_registries(request):
+    """What a page registers is known to no other test, also where the page is the first to import a registry."""
+    for module in REGISTRIES:
+        importlib.import_module(module)
+    request.getfixturevalue("clean_registries")
+
+
+@pytest.mark.usefixtures("own_registries")
 @pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, "python")], ids=name_of)
 def test_python_blocks_run_one_after_the_other(page, capsys, tmp_path, monkeypatch):
     # A module of its own: what is defined on a page can be pickled and imported by name, as in a reader's file.

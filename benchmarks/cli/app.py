@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -405,4 +404,4 @@ def bench(quick: bool, peers: bool, peers_dir: Path | None, out: Path | None) ->
 
 
 if __name__ == "__main__":
-    main(prog_name=os.environ.get("LEGIBLE_PROG", "legible"))
+    main(prog_name="legible")

@@ -110,11 +110,10 @@ def make_panels(workspace: Workspace, best: npt.NDArray[Any], *, seed: int, eval
         seed: Seed of the random layouts and of the search for efficiency.
         evaluations: Layouts that search scores.
     """
+    from benchmarks.experiments.running import median_of_random
     from optimizers import search
 
-    genomes = workspace.sample(RANDOM_LAYOUTS, np.random.default_rng(seed))
-    order = np.argsort(workspace.legibility(genomes), kind="stable")
-    median = genomes[order[len(order) // 2]]
+    median = median_of_random(workspace, RANDOM_LAYOUTS, np.random.default_rng(seed))
     efficient = search(
         workspace, objective="efficiency", evaluations=evaluations, seed=seed, progress=False
     ).best_genome

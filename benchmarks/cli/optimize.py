@@ -12,7 +12,7 @@ import click
 
 from benchmarks.console import number
 from benchmarks.presenters.base import Part, Presenter, summary_of
-from benchmarks.presenters.registry import presenter_of, usable_presenters, workspace_of
+from benchmarks.presenters.registry import presenter_of, presenter_of_run, usable_presenters
 from legible_envs.workspace import workspace_class
 from optimizers.errors import SearchError
 from optimizers.runs.folder import RunFolder, is_run_folder
@@ -73,7 +73,7 @@ def run_search(domain: str, out: Path, settings: Mapping[str, Any], given: Colle
         settings = _continued(before, settings, given)
     config |= presenter.design(settings) | dict(settings.get("assigned", ()))
     parts = presenter.parts(config, settings, out)
-    results = [_search_part(domain, presenter, part, settings, out) for part in parts]
+    results = [_search_part(domain, part, settings, out) for part in parts]
     _tell(presenter, results[0], parts)
 
 
@@ -98,7 +98,7 @@ def _continued(before: Mapping[str, Any], settings: Mapping[str, Any], given: Co
     return {"evaluations": None, "iterations": None, **own, **kept}
 
 
-def _search_part(domain: str, presenter: Presenter, part: Part, settings: Mapping[str, Any], out: Path) -> SearchResult:
+def _search_part(domain: str, part: Part, settings: Mapping[str, Any], out: Path) -> SearchResult:
     """One search of one folder."""
     from optimizers import SearchInterrupted, search
 
@@ -161,9 +161,9 @@ def write_pictures(folder: Path) -> dict[str, Path]:
     from optimizers import load_run
 
     run = load_run(folder)
-    pictures = {"picture": write_best_image(folder), "panels": presenter_of(workspace_of(run)).write_panels(run)}
+    pictures = {"picture": write_best_image(run), "panels": presenter_of_run(run).write_panels(run)}
     written = {name: path for name, path in pictures.items() if path is not None}
-    return {**written, "report": write_report(folder)}
+    return {**written, "report": write_report(run)}
 
 
 def emitter_rows() -> list[dict[str, Any]]:

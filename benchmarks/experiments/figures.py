@@ -7,17 +7,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from benchmarks.experiments.conditions import in_order
+from benchmarks.experiments.conditions import compare_layouts, in_order, slug
 from legible_envs.drawing.chart_parts import legend_above, round_upwards
-from legible_envs.drawing.charts import COLOURS, SOFT, Chart, ChartSize, styled
+from legible_envs.drawing.charts import COLOURS, SOFT, Chart, ChartSize, save_figure, styled
 from predictors.evaluation.figures import accuracy_figure, learning_curve_figure
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     import pandas as pd
 
     from predictors.evaluation.comparison import Comparison
 
-__all__ = ["accuracy_by_condition", "bars_by_condition", "learning_by_condition"]
+__all__ = ["accuracy_by_condition", "bars_by_condition", "learning_by_condition", "save_accuracy", "save_learning"]
 
 
 def accuracy_by_condition(
@@ -37,6 +39,33 @@ def accuracy_by_condition(
     if note:
         table.attrs["evaluation"] = note
     return accuracy_figure(table, title=title, subtitle=subtitle, size=size)
+
+
+def save_accuracy(
+    rows: pd.DataFrame, predictor: str, conditions: Sequence[str], path: Path, *, title: str, note: str = ""
+) -> Path:
+    """Write the accuracy of one predictor against fraction observed, compared over layouts.
+
+    Args:
+        rows: ``predictor, condition, layout, participant, fraction, correct, chance``.
+        predictor: Whose.
+        conditions: In order.
+        path: The file.
+        title: Heading.
+        note: At the foot.
+    """
+    each, _ = compare_layouts(rows, predictor)
+    chance = float(rows[rows["predictor"] == predictor]["chance"].mean())
+    subtitle = f"mean over {int(each.means['n'].min())} layouts per condition; bands: Tukey's half-width over layouts"
+    return save_figure(path, accuracy_by_condition(each, conditions, chance, title, subtitle, note))
+
+
+def save_learning(curves: pd.DataFrame, conditions: Sequence[str], folder: Path) -> list[Path]:
+    """Write the figure of :func:`learning_by_condition` for every predictor that has curves."""
+    return [
+        save_figure(folder / f"{slug('learning', name)}.svg", learning_by_condition(curves, name, conditions))
+        for name in dict.fromkeys(curves["predictor"] if len(curves) else ())
+    ]
 
 
 def learning_by_condition(

@@ -18,12 +18,11 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+    from benchmarks.trials.store import Rows
     from legible_envs.rollouts.trajectory import Trajectory
     from predictors.base import GoalPredictor
 
 __all__ = ["accuracy_rows", "by_table", "confusion_matrix", "curve_rows", "labelled", "logged_rows"]
-
-Rows = list[dict[str, Any]]
 
 
 def labelled(table: str, rows: pd.DataFrame) -> Rows:

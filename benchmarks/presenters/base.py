@@ -48,6 +48,7 @@ __all__ = [
     "summary_of",
     "template",
     "text_of",
+    "workspace_of_run",
 ]
 
 WANTED: Final = {"legibility": "legible", "efficiency": "efficient", "legible-efficient": "legible and efficient"}
@@ -262,7 +263,7 @@ class Presenter:
 
     def design_of_run(self, run: SearchResult, asked: Mapping[str, Any]) -> Design:
         """The best layout of a run; ``asked`` are settings of the score given on the command line."""
-        workspace = make_workspace({**run.config["workspace"], **asked}) if asked else run.workspace
+        workspace = workspace_of_run(run, asked)
         genome = run.require_genome()
         return Design(run.workspace.decode(genome), workspace, genome, "", dict(asked), presenter=self)
 
@@ -359,6 +360,11 @@ def summary_of(workspace: Workspace, genome: Any) -> dict[str, Any]:
     return {**{key: float(of(genome)) for key, of in missing.items() if key not in own}, **own}
 
 
+def workspace_of_run(run: SearchResult, asked: Mapping[str, Any]) -> Workspace:
+    """The workspace that a run searched, with the settings asked for in place of its own."""
+    return make_workspace({**run.config["workspace"], **asked}) if asked else run.workspace
+
+
 def _shown(value: Any) -> str:
     return number(value, 4) if isinstance(value, float) else str(value)
 
@@ -373,7 +379,7 @@ def refuse(asked: Mapping[str, Any], option: str, noun: str) -> None:
         raise LayoutError(f"--{option} does not apply: this is a {noun}", rule="type")
 
 
-def as_genome(workspace: Any, layout: Any) -> tuple[npt.NDArray[Any] | None, str]:
+def as_genome(workspace: Workspace, layout: Any) -> tuple[npt.NDArray[Any] | None, str]:
     """A layout's genome, or None and the rule it breaks."""
     try:
         return np.asarray(workspace.encode(layout)), ""

@@ -10,7 +10,17 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks.console import kitchen_text, number
-from benchmarks.presenters.base import WANTED, Design, Panel, Presenter, ReportTexts, as_genome, refuse, template
+from benchmarks.presenters.base import (
+    WANTED,
+    Design,
+    Panel,
+    Presenter,
+    ReportTexts,
+    as_genome,
+    refuse,
+    template,
+    workspace_of_run,
+)
 from benchmarks.presenters.registry import load_design
 from legible_envs.errors import LayoutError
 from legible_envs.overcooked.layout import OvercookedLayout
@@ -195,10 +205,8 @@ class KitchenPresenter(Presenter):
 
     def design_of_run(self, run: SearchResult, asked: Mapping[str, Any]) -> Design:
         """The best kitchen of a run."""
-        from legible_envs.workspace import make_workspace
-
         refuse(asked, "task", "kitchen")
-        workspace = make_workspace({**run.config["workspace"], **asked}) if asked else run.workspace
+        workspace = workspace_of_run(run, asked)
         genome = run.require_genome()
         return Kitchen(run.best_layout, workspace, genome, "", dict(asked))
 

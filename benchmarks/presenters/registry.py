@@ -25,10 +25,10 @@ __all__ = [
     "list_presenters",
     "load_design",
     "presenter_of",
+    "presenter_of_run",
     "read_source",
     "register_presenter",
     "usable_presenters",
-    "workspace_of",
 ]
 
 GROUP: Final = "legible.presenters"
@@ -128,7 +128,7 @@ def load_design(
         from optimizers import load_run
 
         run = load_run(source)
-        return presenter_of(workspace_of(run)).design_of_run(run, asked)
+        return presenter_of_run(run).design_of_run(run, asked)
     name, text = read_source(source)
     if workspace is not None:
         return presenter_of(workspace).read_design(text, name, asked)
@@ -138,16 +138,17 @@ def load_design(
     raise LayoutError(f"{name} is no layout that a presenter recognises; name its --workspace", rule="type")
 
 
-def workspace_of(run: SearchResult) -> str:
-    """Name of the workspace that a run searched.
+def presenter_of_run(run: SearchResult) -> Presenter:
+    """The presenter of the workspace that a run searched.
 
     Raises:
-        SearchError: Its manifest names none.
+        SearchError: Its manifest names no workspace.
+        ValueError: No such workspace, or its presenter cannot be made.
     """
     name = run.config["workspace"].get("workspace")
     if not isinstance(name, str):
         raise SearchError(f"{run.folder}: its manifest names no workspace")
-    return name
+    return presenter_of(name)
 
 
 def read_source(source: str) -> tuple[str, str]:

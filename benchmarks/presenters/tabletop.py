@@ -12,11 +12,21 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from benchmarks.console import number, table_text
-from benchmarks.presenters.base import WANTED, Design, Part, Presenter, ReportTexts, as_genome, refuse, template
+from benchmarks.presenters.base import (
+    WANTED,
+    Design,
+    Part,
+    Presenter,
+    ReportTexts,
+    as_genome,
+    refuse,
+    template,
+    workspace_of_run,
+)
 from benchmarks.presenters.registry import load_design, read_source
 from benchmarks.presenters.tabletop_panels import CONDITIONS, LIST, beta_of, listed, panels_of, write_panels
 from legible_envs.errors import LayoutError
-from legible_envs.support.files import write_atomically
+from legible_envs.support.files import write_text
 from legible_envs.tabletop import TabletopLayout, TabletopTask
 from optimizers.runs.folder import is_run_folder
 
@@ -272,7 +282,7 @@ class TablePresenter(Presenter):
             ]
             text = json.dumps(together, indent=1) + "\n"
             out.mkdir(parents=True, exist_ok=True)
-            write_atomically(out / LIST, lambda stream: stream.write(text.encode()))
+            write_text(out / LIST, text)
             return parts
         chosen = config if asked is None else {**config, "condition": asked}
         part = Part(out, make_workspace(chosen))
@@ -296,11 +306,9 @@ class TablePresenter(Presenter):
 
     def design_of_run(self, run: SearchResult, asked: Mapping[str, Any]) -> Design:
         """The best table of a run."""
-        from legible_envs.workspace import make_workspace
-
         refuse(asked, "pots", "table")
         refuse(asked, "task", "run, which has its own task")
-        workspace: Any = make_workspace({**run.config["workspace"], **asked}) if asked else run.workspace
+        workspace: Any = workspace_of_run(run, asked)
         genome = run.require_genome()
         return TableDesign(run.best_layout, workspace, genome, "", dict(asked), workspace.task, run)
 

@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field
-from pathlib import Path
-from typing import TYPE_CHECKING
-
-from legible_envs.support.files import write_atomically
-
-if TYPE_CHECKING:
-    import pandas as pd
-
 import base64
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
 from importlib.resources import files
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from legible_envs import __version__
+from legible_envs.support.files import write_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -54,7 +47,7 @@ def write_experiment_report(
         footer=f"legible-envs {__version__}. Every table lies beside this page as CSV.",
     )
     path = folder / "report.html"
-    write_atomically(path, lambda stream: stream.write(text.encode()))
+    write_text(path, text)
     return path
 
 
@@ -152,7 +145,7 @@ class Section:
 def write_table(path: Path, table: pd.DataFrame) -> Path:
     """Write a table as CSV, all or nothing; folders that are missing are made."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_atomically(path, lambda stream: stream.write(table.to_csv(index=False).encode()))
+    write_text(path, table.to_csv(index=False))
     return path
 
 

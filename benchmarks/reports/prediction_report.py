@@ -10,7 +10,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from legible_envs.support.files import write_atomically
+from benchmarks.reports.experiment_report import write_tables
+from legible_envs.support.files import write_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -202,18 +203,13 @@ def write_evaluation(results: PredictionResults, folder: Path, *, title: str = "
     from legible_envs.drawing.charts import save_figure
 
     folder.mkdir(parents=True, exist_ok=True)
-    written = [_write(folder / f"{name}.csv", table.to_csv(index=False)) for name, table in _tables(results).items()]
+    written = write_tables(folder, _tables(results).items())
     for name in _FIGURES:  # those of an earlier evaluation must not stand beside this one's tables
         (folder / f"{name}.svg").unlink(missing_ok=True)
     written += [save_figure(folder / f"{name}.svg", figure) for name, figure in _drawn(results).items()]
-    written.append(_write(folder / _FILE, json.dumps(_about(results), indent=1)))
-    written.append(_write(folder / "report.html", _page(folder, title)))
-    return written
-
-
-def _write(path: Path, text: str) -> Path:
-    write_atomically(path, lambda stream: stream.write(text.encode()))
-    return path
+    write_text(folder / _FILE, json.dumps(_about(results), indent=1))
+    write_text(folder / "report.html", _page(folder, title))
+    return [*written, folder / _FILE, folder / "report.html"]
 
 
 def _tables(results: PredictionResults) -> dict[str, pd.DataFrame]:

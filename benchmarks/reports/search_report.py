@@ -18,10 +18,11 @@ import numpy as np
 
 from benchmarks.presenters.base import Panel, Presenter, summary_of, template
 from benchmarks.presenters.losses import explains_stages, loss_row
-from benchmarks.presenters.registry import presenter_of, workspace_of
+from benchmarks.presenters.registry import presenter_of_run
 from benchmarks.reports.prediction_report import FOLDER, evaluation_section
-from legible_envs.support.files import write_atomically
+from legible_envs.support.files import write_text
 from optimizers import Elites, SearchResult, load_run
+from optimizers.errors import SearchError
 
 __all__ = ["report_data", "write_best_image", "write_report"]
 
@@ -38,7 +39,7 @@ MAX_POINTS = 240
 
 
 def write_report(
-    run_folder: str | Path,
+    run: str | Path | SearchResult,
     *,
     panels: Sequence[Panel] | None = None,
     recorded_play: Mapping[str, Any] | None = None,
@@ -48,7 +49,7 @@ def write_report(
     The results of ``legible score RUN --predictor NAME`` are a section of it.
 
     Args:
-        run_folder: The folder of a finished, interrupted or running search.
+        run: The folder of a finished, interrupted or running search, or what :func:`optimizers.load_run` read there.
         panels: Layouts to show side by side; None shows those that the run itself compares, if any.
         recorded_play: How well predictors predict recorded participants' goals (see
             :func:`benchmarks.cli.demo.recorded_play`): ``note``, ``fractions``, ``curves`` (each ``label``,
@@ -61,17 +62,17 @@ def write_report(
     Raises:
         SearchError: A file of the run is missing or damaged, or no layout has scored yet.
     """
-    folder, run = Path(run_folder), load_run(run_folder)
+    folder, run = _read(run)
     path = folder / "report.html"
-    presenter = _presenter(run)
+    presenter = presenter_of_run(run)
     data = report_data(run, panels, recorded_play)
     rows = run.workspace.explain(run.require_genome())
     page = _render(data, presenter, rows, evaluation_section(folder / FOLDER) or "")
-    write_atomically(path, lambda stream: stream.write(page.encode()))
+    write_text(path, page)
     return path
 
 
-def write_best_image(run_folder: str | Path, **options: Any) -> Path | None:
+def write_best_image(run: str | Path | SearchResult, **options: Any) -> Path | None:
     """Write ``best.png``, a drawing of the run's best layout, into its folder; ``options`` are those of the drawing.
 
     Returns:
@@ -79,13 +80,18 @@ def write_best_image(run_folder: str | Path, **options: Any) -> Path | None:
     """
     from legible_envs.drawing import save_png
 
-    folder, run = Path(run_folder), load_run(run_folder)
-    picture = _presenter(run).draw(run.workspace.decode(run.require_genome()), run.workspace, **options)
+    folder, run = _read(run)
+    picture = presenter_of_run(run).draw(run.workspace.decode(run.require_genome()), run.workspace, **options)
     return None if picture is None else save_png(folder / "best.png", picture)
 
 
-def _presenter(run: SearchResult) -> Presenter:
-    return presenter_of(workspace_of(run))
+def _read(run: str | Path | SearchResult) -> tuple[Path, SearchResult]:
+    """The folder of a search, and what lies there."""
+    if isinstance(run, str | Path):
+        return Path(run), load_run(run)
+    if run.folder is None:
+        raise SearchError("a search without a folder has no place for its report: give search() a checkpoint folder")
+    return run.folder, run
 
 
 def report_data(
@@ -94,7 +100,7 @@ def report_data(
     recorded_play: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Everything the page shows, as JSON-ready data; this is also what its download button saves."""
-    config, presenter, elites = run.config, _presenter(run), run.elites()
+    config, presenter, elites = run.config, presenter_of_run(run), run.elites()
     rows, columns = (int(n) for n in config["archive"]["dims"])
     found = presenter.panels(run) if panels is None else panels
     return {

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 from benchmarks.sweeps.sweep import Sweep
 from benchmarks.trials import TrialName, TrialStore
-from legible_envs.support.files import write_atomically
+from legible_envs.support.files import write_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -63,11 +63,6 @@ def write_tables(sweep: Sweep, folder: str | Path) -> pd.DataFrame:
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     table = results(sweep, folder)
-    _write(folder / "results.csv", table)
-    _write(folder / "summary.csv", summarise(table))
+    for name, rows in (("results", table), ("summary", summarise(table))):
+        write_text(folder / f"{name}.csv", rows.to_csv(index=False))
     return table
-
-
-def _write(path: Path, table: pd.DataFrame) -> None:
-    content = table.to_csv(index=False).encode()
-    write_atomically(path, lambda stream: stream.write(content))

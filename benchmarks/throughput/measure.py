@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import statistics
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sized
 from dataclasses import dataclass
+from typing import TypeVar
 
-__all__ = ["Figure", "alternate", "rate"]
+__all__ = ["Figure", "alternate", "rate", "sampler"]
+
+Batch = TypeVar("Batch", bound=Sized)
 
 
 @dataclass(frozen=True)
@@ -47,6 +50,16 @@ def rate(work: Callable[[], int], seconds: float) -> float:
         passed = time.process_time() - start
         if passed >= seconds:
             return done / passed
+
+
+def sampler(score: Callable[[Batch], object], batch: Batch, seconds: float) -> Callable[[], float]:
+    """A sampler of how many items of a batch ``score`` does per second; see :func:`rate`."""
+
+    def work() -> int:
+        score(batch)
+        return len(batch)
+
+    return lambda: rate(work, seconds)
 
 
 def alternate(samplers: Mapping[str, Callable[[], float]], rounds: int) -> dict[str, tuple[float, ...]]:

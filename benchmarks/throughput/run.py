@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from benchmarks.throughput.analysis import machine, result_table, to_markdown
-from benchmarks.throughput.measure import Figure, alternate, rate
+from benchmarks.throughput.measure import Figure, alternate, rate, sampler
 from benchmarks.throughput.peers import IMITATION, IRL_MAXENT, OVERCOOKED_AI, Peer, opened
 from benchmarks.throughput.predictors_grid import evaluation_speed, prediction_speed, save_problem
 from benchmarks.throughput.predictors_reaching import reach_speed
@@ -112,7 +112,7 @@ def scoring(settings: Settings) -> list[Figure]:
     for shape in settings.shapes:
         workspace = OvercookedWorkspace(shape=shape)
         genomes = workspace.sample(settings.batch, np.random.default_rng(0))
-        samplers[_name(shape)] = _scorer(workspace, genomes, settings.seconds)
+        samplers[_name(shape)] = sampler(workspace.scores, genomes, settings.seconds)
     workspace = OvercookedWorkspace(shape=(7, 7))
     layouts = [workspace.decode(g) for g in workspace.sample(settings.oracle_layouts, np.random.default_rng(1))]
 
@@ -138,14 +138,6 @@ def scoring(settings: Settings) -> list[Figure]:
 
 def _name(shape: tuple[int, int]) -> str:
     return f"{shape[0]}x{shape[1]}"
-
-
-def _scorer(workspace: Any, genomes: Any, seconds: float) -> Callable[[], float]:
-    def score() -> int:
-        workspace.scores(genomes)
-        return len(genomes)
-
-    return lambda: rate(score, seconds)
 
 
 def searching(settings: Settings) -> list[Figure]:

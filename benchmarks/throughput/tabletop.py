@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from benchmarks.throughput.measure import Figure, alternate, rate
+from benchmarks.throughput.measure import Figure, alternate, rate, sampler
 from benchmarks.throughput.peer_tabletop import stages_of, straight_line_loss, straight_line_losses
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def table_scoring(settings: Settings) -> list[Figure]:
     samplers: dict[str, Callable[[], float]] = {}
     for obstacles in settings.table_obstacles:
         workspace, genomes = tables_with(obstacles, settings.tables)
-        samplers[_key(obstacles)] = _sampler(workspace.scorer.score_genomes, genomes, settings.seconds)
+        samplers[_key(obstacles)] = sampler(workspace.scorer.score_genomes, genomes, settings.seconds)
     tea = TabletopWorkspace("tea", "placement", max_obstacles=0)
     genomes = tea.sample(settings.tables, np.random.default_rng(0))
     centres, stages = genomes.reshape(len(genomes), -1, 2), stages_of(tea.task)
@@ -65,9 +65,9 @@ def table_scoring(settings: Settings) -> list[Figure]:
             straight_line_loss(start, one, labels, stages)
         return len(few)
 
-    samplers["score tea"] = _sampler(tea.scorer.score_genomes, genomes, settings.seconds)
+    samplers["score tea"] = sampler(tea.scorer.score_genomes, genomes, settings.seconds)
     samplers["tea loss"] = lambda: rate(literal, settings.seconds)
-    samplers["tea losses"] = _sampler(lambda some: straight_line_losses(start, some, stages), centres, settings.seconds)
+    samplers["tea losses"] = sampler(lambda some: straight_line_losses(start, some, stages), centres, settings.seconds)
     samples = alternate(samplers, settings.rounds)
     own, loss, losses = (
         Figure(key, what, "/s", samples[key])
@@ -92,14 +92,6 @@ def table_scoring(settings: Settings) -> list[Figure]:
 
 def _key(obstacles: int) -> str:
     return f"score table {obstacles}"
-
-
-def _sampler(score: Callable[[Any], object], batch: Any, seconds: float) -> Callable[[], float]:
-    def work() -> int:
-        score(batch)
-        return len(batch)
-
-    return lambda: rate(work, seconds)
 
 
 def table_searching(settings: Settings) -> list[Figure]:

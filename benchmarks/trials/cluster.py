@@ -50,7 +50,7 @@ class ClusterPool:
                         ended = wait(list(running), timeout=_POLL, return_when="FIRST_COMPLETED").done
                 except TimeoutError:
                     ended = set()
-                # All at once: what is not fetched before its worker is lost has to be run again.
+                # All at once: a result that is not fetched before its worker is lost has to be computed again.
                 outcomes = [_outcome(future, running.pop(future)[0]) for future in ended]
                 yield self._working(running)
                 yield from sorted(outcomes, key=lambda outcome: outcome.number)
@@ -64,7 +64,7 @@ class ClusterPool:
         self._queue.append((number, trial))
 
     def _submit(self, function: str, running: dict[Any, tuple[int, Trial]]) -> None:
-        """A trial per thread, no more: what is not submitted cannot be lost, nor be stuck behind a slow worker."""
+        """A trial per thread, no more: the others cannot be lost, nor be stuck behind a slow worker."""
         room = max(1, sum(self._client.nthreads().values())) - len(running)
         while self._queue and room > 0:
             number, trial = self._queue.popleft()

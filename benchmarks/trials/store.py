@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from benchmarks.trials.functions import TrialName
-from legible_envs.support.files import remove_leftovers, write_atomically
+from legible_envs.support.files import remove_leftovers, write_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -103,7 +103,7 @@ class TrialStore:
         path = next(self._paths(kind, trial))
         path.parent.mkdir(parents=True, exist_ok=True)
         text = json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False)
-        write_atomically(path, lambda stream: stream.write(text.encode()))
+        write_text(path, text)
 
 
 def _read(path: Path) -> Rows | None:

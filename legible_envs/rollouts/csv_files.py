@@ -36,7 +36,7 @@ import numpy as np
 from legible_envs.errors import LayoutError
 from legible_envs.layout_kinds import LayoutKind, kind_named, kind_of, kind_of_line
 from legible_envs.rollouts.trajectory import Trajectory
-from legible_envs.support.files import write_atomically
+from legible_envs.support.files import write_text
 
 __all__ = ["read_csv", "write_csv"]
 
@@ -80,7 +80,7 @@ def write_csv(path: str | os.PathLike[str], trajectories: Iterable[Trajectory]) 
             writer.writerow([number, repr(time), *(repr(value) for value in state), *same])
     target = Path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
-    write_atomically(target, lambda stream: stream.write(text.getvalue().encode()))
+    write_text(target, text.getvalue())
     return target
 
 

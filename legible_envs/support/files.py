@@ -10,7 +10,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-__all__ = ["remove_leftovers", "write_atomically", "write_npz"]
+__all__ = ["remove_leftovers", "write_atomically", "write_npz", "write_text"]
 
 _MARK = ".part-"
 
@@ -39,6 +39,15 @@ def write_atomically(path: Path, write: Callable[[BinaryIO], object]) -> None:
             temporary.unlink()
         raise
     _sync_folder(path.parent)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text in UTF-8, all or nothing, its line breaks as they are.
+
+    Raises:
+        OSError: The file could not be written; what was there before is untouched.
+    """
+    write_atomically(path, lambda stream: stream.write(text.encode()))
 
 
 def write_npz(path: str | os.PathLike[str], arrays: Mapping[str, Any]) -> None:

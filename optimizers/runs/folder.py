@@ -25,7 +25,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from legible_envs.support.files import remove_leftovers, write_atomically
+from legible_envs.support.files import remove_leftovers, write_text
 from optimizers.errors import SearchError
 
 if TYPE_CHECKING:
@@ -119,19 +119,19 @@ class RunFolder:
     def write_config(self, config: Mapping[str, Any]) -> None:
         """Write the manifest."""
         text = json.dumps({"schema": SCHEMA, **config}, indent=2) + "\n"
-        write_atomically(self._config, lambda stream: stream.write(text.encode()))
+        write_text(self._config, text)
 
     def write_best(self, layout: object) -> None:
         """Write the best layout: as JSON where it can say itself so, else as its drawing."""
         as_json = getattr(layout, "to_json", None)
         text = (str(layout) if as_json is None else as_json()).rstrip("\n") + "\n"
         path = self._best if as_json is None else self._best_json
-        write_atomically(path, lambda stream: stream.write(text.encode()))
+        write_text(path, text)
 
     def rewrite_metrics(self, rows: Iterable[Mapping[str, Any]]) -> None:
         """Write ``metrics.csv`` with exactly these rows."""
         text = ",".join(COLUMNS) + "\n" + _as_csv(rows)
-        write_atomically(self._metrics, lambda stream: stream.write(text.encode()))
+        write_text(self._metrics, text)
 
     def append_metrics(self, row: Mapping[str, Any]) -> None:
         """Add one row to ``metrics.csv``."""
@@ -219,4 +219,3 @@ def _as_csv(rows: Iterable[Mapping[str, Any]]) -> str:
     for row in rows:
         writer.writerow(["" if row[name] is None else row[name] for name in COLUMNS])
     return stream.getvalue()
-

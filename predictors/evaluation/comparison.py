@@ -108,8 +108,7 @@ def compare_conditions(
     """
     alpha = real("alpha", alpha, 0, 1, closed="neither")
     choice("at", at, ("each", "mean"))
-    if correct_fractions not in (None, "holm"):
-        raise ValueError(f"`correct_fractions` must be 'holm' or None, got {correct_fractions!r}")
+    choice("correct_fractions", correct_fractions, ("holm", None))
     if isinstance(results, Mapping):
         factor = "condition" if factor == "layout" else factor
     table = _one_table(results)

@@ -14,7 +14,14 @@ from predictors.base import FRACTIONS, GoalPredictor, TieCredit, correctness
 from predictors.evaluation.comparison import Comparison, compare_conditions
 from predictors.evaluation.metrics import tied_shares
 from predictors.evaluation.results import Evaluation, LearningCurve
-from predictors.evaluation.splits import Groups, Split, check_learnable, folds, nested_training_sets
+from predictors.evaluation.splits import (
+    Groups,
+    Split,
+    check_candidate_sets,
+    check_learnable,
+    folds,
+    nested_training_sets,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -63,12 +70,10 @@ def accuracy_at(
         ValueError: Prefixes, unknown goals, or mixed candidate sets, whose accuracies must not be averaged.
     """
     trajectories = list(X)
-    sets = sorted({trajectory.candidate_set for trajectory in trajectories})
-    if len(sets) > 1:
-        raise ValueError(f"trajectories with different candidate sets {sets} must be evaluated apart")
+    candidate_set = check_candidate_sets(trajectories)
     probabilities = predictor.predict_proba_at(trajectories, fractions, cut)
     table = _rows(trajectories, probabilities, predictor.goal_columns(trajectories), fractions, cut, ties)
-    table.attrs.update(cut=cut, definition=CUTS[cut], ties=ties, candidate_set=sets[0] if sets else None)
+    table.attrs.update(cut=cut, definition=CUTS[cut], ties=ties, candidate_set=candidate_set)
     return table
 
 
@@ -215,8 +220,8 @@ def _named(specs: Specs) -> dict[str, GoalPredictor]:
 
 
 def _parts(trajectories: Sequence[Trajectory], by: Part | None) -> dict[str, npt.NDArray[np.intp]]:
-    if by not in (None, "condition", "layout"):
-        raise ValueError(f"`by` must be 'condition', 'layout' or None, got {by!r}")
+    if by is not None:
+        choice("by", by, ("condition", "layout"), also="None")
     labels = np.array(
         [
             trajectory.condition if by == "condition" else _layout_label(trajectory) if by else ""

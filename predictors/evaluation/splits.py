@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import Trajectory
 from legible_envs.support.validation import choice, integer, real
+from predictors.base import check_trajectories
 
-__all__ = ["Groups", "Split", "check_learnable", "folds", "nested_training_sets"]
+__all__ = ["Groups", "Split", "check_candidate_sets", "check_learnable", "folds", "nested_training_sets"]
 
 Groups = Literal["participant"]
 Split = tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]
+
+_GROUPS: Final[tuple[Groups | None, ...]] = ("participant", None)
 
 
 def folds(
@@ -49,6 +52,7 @@ def folds(
     if len(trajectories) < cv:
         raise ValueError(f"{cv} folds need at least {cv} trajectories, got {len(trajectories)}")
     choice("rare", rare, ("error", "keep"))
+    choice("groups", groups, _GROUPS)
     few = {goal: count for goal, count in sorted(Counter(goals).items()) if count < cv}
     if few and rare == "error":
         raise ValueError(
@@ -61,15 +65,13 @@ def folds(
         if min(len(trajectories), max(Counter(goals).values())) < cv:
             raise ValueError(f"no goal has an example for each of the {cv} folds; use fewer folds")
         splitter: Any = StratifiedKFold(cv, shuffle=True, random_state=seed)
-    elif groups == "participant":
+    else:
         participants = [trajectory.participant for trajectory in trajectories]
         if "" in participants:
             raise ValueError(f"trajectory {participants.index('')} names no participant to group by; use groups=None")
         if len(set(participants)) < cv:
             raise ValueError(f"{cv} folds need at least {cv} participants, got {len(set(participants))}")
         splitter = StratifiedGroupKFold(cv, shuffle=True, random_state=seed)
-    else:
-        raise ValueError(f"`groups` must be 'participant' or None, got {groups!r}")
     for train, test in _quietly(splitter, goals, participants):
         _check_fold([trajectories[i] for i in train], [trajectories[i] for i in test])
         yield train, test
@@ -94,20 +96,28 @@ def check_learnable(trajectories: Sequence[Trajectory]) -> list[str]:
     if not trajectories:
         raise ValueError("no trajectories to evaluate on")
     goals = []
-    for number, trajectory in enumerate(trajectories):
-        if not isinstance(trajectory, Trajectory):
-            raise TypeError(f"expected trajectories, got {type(trajectory).__name__} at index {number}")
+    for number, trajectory in enumerate(check_trajectories(trajectories)):
         if trajectory.goal is None:
             raise ValueError(f"trajectory {number} has no known goal to compare with")
         if not trajectory.complete:
             raise ValueError(f"trajectory {number} is a prefix; give complete trajectories")
         goals.append(trajectory.goal)
-    sets = sorted({trajectory.candidate_set for trajectory in trajectories})
-    if len(sets) > 1:
-        raise ValueError(f"trajectories with different candidate sets {sets} must be evaluated apart")
+    check_candidate_sets(trajectories)
     if len(set(goals)) == 1:
         raise ValueError(f"all {len(goals)} trajectories go to {goals[0]!r}; there is nothing to tell apart")
     return goals
+
+
+def check_candidate_sets(trajectories: Sequence[Trajectory]) -> str | None:
+    """The candidate set that all trajectories share; None where there are none.
+
+    Raises:
+        ValueError: Several sets, whose accuracies must not be averaged.
+    """
+    sets = sorted({trajectory.candidate_set for trajectory in trajectories})
+    if len(sets) > 1:
+        raise ValueError(f"trajectories with different candidate sets {sets} must be evaluated apart")
+    return sets[0] if sets else None
 
 
 def _check_fold(train: Sequence[Trajectory], test: Sequence[Trajectory]) -> None:
@@ -143,6 +153,7 @@ def nested_training_sets(
 
     goals = np.array(check_learnable(trajectories))
     test_share = real("test_share", test_share, 0, 1, closed="neither")
+    choice("groups", groups, _GROUPS)
     order = rng.permutation(len(trajectories))
     if groups is None:
         place = np.empty(len(trajectories))
@@ -152,13 +163,11 @@ def nested_training_sets(
         count = min(max(round(test_share * len(trajectories)), 1), len(trajectories) - 1)
         order = order[np.argsort(place[order], kind="stable")]
         test, pool = np.sort(order[:count]), order[count:]
-    elif groups == "participant":
+    else:
         participants = [trajectory.participant for trajectory in trajectories]
         if len(set(participants)) < 2:
             raise ValueError("grouping by participant needs at least two participants")
         split = GroupShuffleSplit(1, test_size=test_share, random_state=int(rng.integers(2**31)))
         train, test = next(split.split(np.zeros(len(trajectories)), groups=participants))
         pool = order[np.isin(order, train)]
-    else:
-        raise ValueError(f"`groups` must be 'participant' or None, got {groups!r}")
     return pool, test

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
@@ -11,7 +10,7 @@ import numpy.typing as npt
 
 from legible_envs.overcooked.layout import FLOOR, OvercookedLayout
 from legible_envs.rollouts.trajectory import Trajectory
-from predictors.base import GoalPredictor, GoalStream, check_trajectories
+from predictors.base import CandidatePredictor, GoalStream
 
 __all__ = ["GridPredictor", "check_complete", "check_trajectory", "goal_posterior", "remaining_steps"]
 
@@ -145,22 +144,9 @@ class GridStream(GoalStream):
         return self._context.observed(np.array(self._points), np.array(self._times))
 
 
-class GridPredictor(GoalPredictor):
-    """A predictor that takes one trajectory at a time; subclasses define ``candidate_probabilities``."""
-
-    @abstractmethod
-    def candidate_probabilities(self, trajectory: Trajectory) -> npt.NDArray[np.float64]:
-        """``(len(trajectory.candidates),)`` probabilities in the order of the candidates."""
+class GridPredictor(CandidatePredictor):
+    """A predictor on grids, one trajectory at a time; subclasses define ``candidate_probabilities``."""
 
     def stream(self, context: Trajectory) -> GridStream:
         """Predict one person's goal while they move; see :meth:`GoalPredictor.stream`."""
         return GridStream(self, context)
-
-    def predict_proba(self, X: Sequence[Trajectory]) -> npt.NDArray[np.float64]:
-        """See :meth:`GoalPredictor.predict_proba`."""
-        trajectories = check_trajectories(X)
-        columns = [self.candidate_columns(trajectory) for trajectory in trajectories]
-        probabilities = np.zeros((len(trajectories), len(self.classes_)))
-        for row, trajectory in enumerate(trajectories):
-            probabilities[row, columns[row]] = self.candidate_probabilities(trajectory)
-        return probabilities

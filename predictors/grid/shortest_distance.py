@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal, Self
+from typing import Literal, Self, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import Trajectory
+from legible_envs.support.validation import choice
 from predictors.base import TIE_TOLERANCE
 from predictors.grid.base import GridPredictor, check_trajectory, remaining_steps
 from predictors.reaching.base import goal_places, learn_places, straight_lines
@@ -56,8 +57,7 @@ class ShortestDistance(GridPredictor):
         Raises:
             ValueError: An unknown metric, or a trajectory that does not fit its layout.
         """
-        if self.metric not in ("manhattan", "geodesic", "euclidean"):
-            raise ValueError(f"`metric` must be 'manhattan', 'geodesic' or 'euclidean', got {self.metric!r}")
+        choice("metric", self.metric, get_args(Metric))
         if self.metric == "euclidean":
             return self._nearest(self._straight_lines(trajectory))
         layout = check_trajectory(trajectory)

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import Trajectory
-from predictors.base import GoalPredictor, check_trajectories
+from predictors.base import CandidatePredictor
 
 __all__ = ["PlacePredictor", "goal_places", "learn_places", "straight_lines"]
 
@@ -64,7 +64,7 @@ def straight_lines(point: npt.NDArray[np.floating], places: npt.NDArray[np.float
     return np.sqrt(((places - point) ** 2).sum(axis=1))
 
 
-class PlacePredictor(GoalPredictor):
+class PlacePredictor(CandidatePredictor):
     """A predictor that knows where goals are and looks at one reach at a time.
 
     Subclasses define ``weigh``.
@@ -88,14 +88,7 @@ class PlacePredictor(GoalPredictor):
         """``(n,)`` weights of the candidates after at least one state, for subclasses that use more than the states."""
         return self.weigh(trajectory.states, goal_places(trajectory, self.places_))
 
-    def predict_proba(self, X: Sequence[Trajectory]) -> npt.NDArray[np.float64]:
-        """See :meth:`GoalPredictor.predict_proba`."""
-        trajectories = check_trajectories(X)
-        columns = [self.candidate_columns(trajectory) for trajectory in trajectories]
-        probabilities = np.zeros((len(trajectories), len(self.classes_)))
-        for row, trajectory in enumerate(trajectories):
-            weights = np.ones(len(trajectory.candidates))
-            if trajectory.num_states:
-                weights = self.weigh_trajectory(trajectory)
-            probabilities[row, columns[row]] = weights / weights.sum()
-        return probabilities
+    def candidate_probabilities(self, trajectory: Trajectory) -> npt.NDArray[np.float64]:
+        """See :meth:`CandidatePredictor.candidate_probabilities`; all alike before the first state."""
+        weights = self.weigh_trajectory(trajectory) if trajectory.num_states else np.ones(len(trajectory.candidates))
+        return weights / weights.sum()

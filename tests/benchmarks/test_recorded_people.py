@@ -61,7 +61,7 @@ def test_accuracy_counts_walks_and_skill_takes_chance_away() -> None:
     assert place["accuracy"] == pytest.approx(0.9)
     assert place["skill"] == pytest.approx(0.8)
     assert place["participants"] == 2
-    assert not len(places_of(scores, readings, "stage", min_walks=41))
+    assert not len(places_of(scores, readings, "stage", min_trajectories=41))
 
 
 def test_rank_correlation_is_scipys() -> None:

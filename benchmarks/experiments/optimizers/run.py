@@ -27,7 +27,7 @@ def reproduce(
     settings: Settings | None = None,
     **how: Unpack[RunOptions],
 ) -> None:
-    """Run what is not there yet, and write ``searches.csv``; tables and figures are made of it by ``sections``.
+    """Run the trials that have no result yet, and write ``searches.csv``; ``sections`` makes tables and figures of it.
 
     Args:
         folder: Folder of the experiment.

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from matplotlib.patches import Rectangle
 
-from benchmarks.experiments.conditions import compare_layouts, slug
-from benchmarks.experiments.figures import accuracy_by_condition, bars_by_condition, learning_by_condition
+from benchmarks.experiments.conditions import slug
+from benchmarks.experiments.figures import bars_by_condition, save_accuracy, save_learning
 from benchmarks.experiments.overcooked import tables
 from benchmarks.experiments.overcooked.sweep import CONDITIONS
 from legible_envs.drawing.chart_parts import number_squares
@@ -138,7 +138,7 @@ def boards(best: pd.DataFrame) -> Any:
     )
 
 
-def rewards(best: pd.DataFrame, costs: pd.DataFrame, predictor: str) -> Any:
+def rewards(best: pd.DataFrame, costs: pd.DataFrame) -> Any:
     """What each cell is worth to the participants in the layouts shown, as inverse reinforcement learning sees it."""
     from legible_envs.overcooked import OvercookedLayout
     from legible_envs.overcooked.rendering import draw_ambiguity, draw_side_by_side
@@ -188,18 +188,12 @@ def draw_all(results: tables.Results, folder: Path) -> dict[str, list[Path]]:
         "published": [save_figure(folder / "published.svg", published)],
         "accuracy": _accuracy_figures(results, folder),
         "confusion": _confusion_figures(results, best, folder),
-        "curves": [
-            save_figure(
-                folder / f"{slug('learning', name)}.svg",
-                learning_by_condition(results.curves, name, LEGIBLE_FIRST),
-            )
-            for name in dict.fromkeys(results.curves["predictor"] if len(results.curves) else ())
-        ],
+        "curves": save_learning(results.curves, LEGIBLE_FIRST, folder),
     }
     costs = results.readings.get("cost")
     if costs is not None:
         own = costs[costs["walker"] == results.walkers[0]]
-        found["confusion"].append(save_png(folder / "rewards.png", rewards(best, own, first)))
+        found["confusion"].append(save_png(folder / "rewards.png", rewards(best, own)))
     return found
 
 
@@ -208,16 +202,8 @@ def _accuracy_figures(results: tables.Results, folder: Path) -> list[Path]:
     for walker in results.walkers:
         rows = tables.accuracy_rows(results, walker)
         for predictor in results.predictors:
-            each, _ = compare_layouts(rows, predictor)
-            figure = accuracy_by_condition(
-                each,
-                LEGIBLE_FIRST,
-                float(rows[rows["predictor"] == predictor]["chance"].mean()),
-                f"{predictor}, {walker} participants",
-                f"mean over {int(each.means['n'].min())} layouts per condition; bands: Tukey's half-width over layouts",
-                _NOTE,
-            )
-            files.append(save_figure(folder / f"{slug('accuracy', walker, predictor)}.svg", figure))
+            path, title = folder / f"{slug('accuracy', walker, predictor)}.svg", f"{predictor}, {walker} participants"
+            files.append(save_accuracy(rows, predictor, LEGIBLE_FIRST, path, title=title, note=_NOTE))
     return files
 
 

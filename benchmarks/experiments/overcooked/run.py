@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
@@ -19,7 +20,7 @@ from benchmarks.experiments.overcooked.sweep import (
     people_of,
 )
 from benchmarks.experiments.predictor_settings import predictor_from
-from benchmarks.experiments.running import Rows, RunOptions, log_trials, with_layouts
+from benchmarks.experiments.running import Rows, RunOptions, log_trials, median_of_random, with_layouts
 from benchmarks.experiments.trial_rows import accuracy_rows, curve_rows
 from benchmarks.trials import TrialName, trial_function
 
@@ -41,7 +42,7 @@ def reproduce(
     settings: Settings | None = None,
     **how: Unpack[RunOptions],
 ) -> None:
-    """Run what is not there yet, and write result files; tables and figures are made of them by ``sections``.
+    """Run the trials that have no result yet, and write result files; ``sections`` makes tables and figures of them.
 
     Args:
         folder: Folder of the experiment. ``layouts.csv``, ``people.csv``, ``readings.csv`` and ``curves.csv`` hold the
@@ -58,7 +59,7 @@ def reproduce(
     """
     settings, folder = with_layouts(settings or (QUICK if quick else FULL), seeds), Path(folder)
 
-    def log(name: str, function: Any, trials: Rows, *hidden: str) -> pd.DataFrame:
+    def log(name: str, function: Callable[[dict[str, Any]], Any], trials: Rows, *hidden: str) -> pd.DataFrame:
         return log_trials(function, trials, folder / f"{name}.csv", hidden=("how", *hidden), **how)
 
     layouts = log("layouts", find_layout, layout_trials(settings))
@@ -93,9 +94,8 @@ def find_layout(trial: dict[str, Any]) -> Rows:
     workspace = OvercookedWorkspace(shape=tuple(trial["shape"]))
     elites: Rows = []
     if trial["condition"] == "Random":
-        genomes = workspace.sample(trial["initial"], np.random.default_rng(trial["layout"]))
-        order = np.argsort(workspace.legibility(genomes), kind="stable")
-        genome, evaluations = genomes[order[len(order) // 2]], trial["initial"]
+        evaluations = trial["initial"]
+        genome = median_of_random(workspace, evaluations, np.random.default_rng(trial["layout"]))
     else:
         found = search(
             workspace,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 import numpy as np
 import numpy.typing as npt
 
-from benchmarks.experiments.recorded.sweep import BOOTSTRAPS, MIN_WALKS
+from benchmarks.experiments.recorded.sweep import BOOTSTRAPS, MIN_TRAJECTORIES
 from benchmarks.experiments.trial_rows import logged_rows
 from benchmarks.reports.experiment_report import Section, write_tables
 from predictors.evaluation.rank_correlation import detectable, spearman, spearman_rows
@@ -65,14 +65,16 @@ def sections(folder: str | Path, *, bootstraps: int = BOOTSTRAPS) -> list[Sectio
 # -- places -----------------------------------------------------------------------------------------------------------
 
 
-def places_of(scores: pd.DataFrame, readings: pd.DataFrame, level: Level, min_walks: int = MIN_WALKS) -> pd.DataFrame:
+def places_of(
+    scores: pd.DataFrame, readings: pd.DataFrame, level: Level, min_trajectories: int = MIN_TRAJECTORIES
+) -> pd.DataFrame:
     """Legibility and measured accuracy side by side.
 
     Args:
         scores: As logged.
         readings: As logged.
         level: A row per ``"stage"`` (start and set of goals) or per ``"reach"`` (the goal, too).
-        min_walks: Places with fewer recorded trajectories are left out.
+        min_trajectories: Places with fewer recorded trajectories are left out.
 
     Returns:
         ``candidate_set, kitchen, start, goals`` (and ``goal``), ``predictor, candidates, walks`` (trajectories),
@@ -86,7 +88,7 @@ def places_of(scores: pd.DataFrame, readings: pd.DataFrame, level: Level, min_wa
         walks=("walks", "sum"), hits=("hits", "sum"), participants=("participant", "nunique")
     )
     table = found.reset_index().merge(own[[*keys, "candidates", "score"]], on=keys)
-    table = table[table["walks"] >= min_walks].reset_index(drop=True)
+    table = table[table["walks"] >= min_trajectories].reset_index(drop=True)
     table["accuracy"] = table.pop("hits") / table["walks"]
     table["skill"] = _skill(table["accuracy"].to_numpy(), table["candidates"].to_numpy())
     return table

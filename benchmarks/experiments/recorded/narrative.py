@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from benchmarks.experiments.recorded.sweep import MIN_WALKS
+from benchmarks.experiments.recorded.sweep import MIN_TRAJECTORIES
 from benchmarks.reports.narrative import narrate
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ def about_correlations(correlations: pd.DataFrame) -> str:
         for candidate_set, own in correlations.groupby("candidate_set", sort=False)
         for level, part in own.groupby("level", sort=False)
     ]
-    return narrate("recorded/correlations", min_walks=MIN_WALKS, verdicts=verdicts)
+    return narrate("recorded/correlations", min_trajectories=MIN_TRAJECTORIES, verdicts=verdicts)
 
 
 def _verdict(part: pd.DataFrame) -> dict[str, Any]:

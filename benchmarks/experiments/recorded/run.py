@@ -26,7 +26,7 @@ def reproduce(
     settings: Settings | None = None,
     **how: Unpack[RunOptions],
 ) -> None:
-    """Run what is not there yet, and write ``scores.csv`` and ``readings.csv``; ``sections`` makes tables and figures.
+    """Run the trials that have no result yet; write ``scores.csv`` and ``readings.csv`` (``sections`` shows them).
 
     Args:
         folder: Folder of the experiment.

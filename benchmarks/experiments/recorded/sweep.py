@@ -8,9 +8,9 @@ from typing import Any, Final
 from benchmarks.experiments.prediction.sweep import LAYOUTS, PREDICTORS
 from legible_envs.rollouts.trajectory import Cut
 
-__all__ = ["BOOTSTRAPS", "FULL", "MIN_WALKS", "QUICK", "Settings", "accuracy_trials", "score_trials"]
+__all__ = ["BOOTSTRAPS", "FULL", "MIN_TRAJECTORIES", "QUICK", "Settings", "accuracy_trials", "score_trials"]
 
-MIN_WALKS: Final = 10
+MIN_TRAJECTORIES: Final = 10
 """Stages and goals with fewer recorded trajectories are left out: their accuracy is mostly chance."""
 BOOTSTRAPS: Final = 2000
 """Resamples behind an interval."""

@@ -39,7 +39,7 @@ def sections(folder: str | Path) -> list[Section]:
     drawn = figures.draw_all(results, folder / "figures")
     return [
         *_accuracy_sections(results, found, drawn),
-        *_claim_sections(results, found, hypotheses, drawn),
+        *_claim_sections(found, hypotheses, drawn),
         Section(
             "With a robot",
             narrative.about_teams(results, found["teams"], found["team_differences"]),
@@ -114,10 +114,7 @@ def _accuracy_sections(
 
 
 def _claim_sections(
-    results: tables.Results,
-    found: dict[str, pd.DataFrame],
-    hypotheses: dict[str, Hypotheses],
-    drawn: dict[str, list[Path]],
+    found: dict[str, pd.DataFrame], hypotheses: dict[str, Hypotheses], drawn: dict[str, list[Path]]
 ) -> list[Section]:
     return [
         Section(

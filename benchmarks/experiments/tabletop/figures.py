@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from benchmarks.experiments.conditions import compare_layouts, slug
-from benchmarks.experiments.figures import accuracy_by_condition, bars_by_condition, learning_by_condition
+from benchmarks.experiments.conditions import slug
+from benchmarks.experiments.figures import bars_by_condition, save_accuracy, save_learning
 from benchmarks.experiments.tabletop import tables
 from benchmarks.experiments.tabletop.sweep import CONDITIONS
 from legible_envs.drawing.chart_parts import legend_above, round_upwards
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
     import pandas as pd
     from matplotlib.axes import Axes
+
+    from legible_envs.tabletop import TabletopLayout, TabletopTask
 
 __all__ = ["boards", "draw_all", "spreads_over_tables", "team_figure"]
 
@@ -61,7 +63,7 @@ def spreads_over_tables(best: pd.DataFrame, spreads: pd.DataFrame, width: int = 
     return draw_side_by_side(images, list(best["condition"]), captions, columns=3, text=max(13, round(width * 0.047)))
 
 
-def _draw_spread(layout: Any, task: Any, own: pd.DataFrame, width: int) -> npt.NDArray[np.uint8]:
+def _draw_spread(layout: TabletopLayout, task: TabletopTask, own: pd.DataFrame, width: int) -> npt.NDArray[np.uint8]:
     from PIL import Image, ImageDraw
 
     from legible_envs.tabletop.rendering import draw_table
@@ -176,13 +178,7 @@ def draw_all(results: tables.Results, folder: Path) -> dict[str, list[Path]]:
         ],
         "accuracy": _accuracy_figures(results, folder),
         "confusion": _confusion_figures(results, best, folder),
-        "curves": [
-            save_figure(
-                folder / f"{slug('learning', name)}.svg",
-                learning_by_condition(results.curves, name, BEST_FIRST),
-            )
-            for name in dict.fromkeys(results.curves["predictor"])
-        ],
+        "curves": save_learning(results.curves, BEST_FIRST, folder),
         "teams": [save_figure(folder / "teams.svg", team_figure(tables.team_table(results)))],
     }
 
@@ -190,15 +186,8 @@ def draw_all(results: tables.Results, folder: Path) -> dict[str, list[Path]]:
 def _accuracy_figures(results: tables.Results, folder: Path) -> list[Path]:
     files, rows = [], tables.accuracy_rows(results)
     for predictor in results.predictors:
-        each, _ = compare_layouts(rows, predictor)
-        figure = accuracy_by_condition(
-            each,
-            BEST_FIRST,
-            float(rows[rows["predictor"] == predictor]["chance"].mean()),
-            f"Goals predicted correctly: {predictor}",
-            f"mean over {int(each.means['n'].min())} layouts per condition; bands: Tukey's half-width over layouts",
-        )
-        files.append(save_figure(folder / f"{slug('accuracy', predictor)}.svg", figure))
+        path, title = folder / f"{slug('accuracy', predictor)}.svg", f"Goals predicted correctly: {predictor}"
+        files.append(save_accuracy(rows, predictor, BEST_FIRST, path, title=title))
     return files
 
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
 from benchmarks.experiments.predictor_settings import predictor_from
-from benchmarks.experiments.running import Rows, RunOptions, log_trials, with_layouts
+from benchmarks.experiments.running import Rows, RunOptions, log_trials, median_of_random, with_layouts
 from benchmarks.experiments.tabletop.sweep import (
     DESIGNS,
     FULL,
@@ -55,7 +55,7 @@ def reproduce(
     settings: Settings | None = None,
     **how: Unpack[RunOptions],
 ) -> None:
-    """Run what is not there yet, and write result files; tables and figures are made of them by ``sections``.
+    """Run the trials that have no result yet, and write result files; ``sections`` makes tables and figures of them.
 
     Args:
         folder: Folder of the experiment. ``layouts.csv``, ``readings.csv``, ``curves.csv``, ``spreads.csv`` and
@@ -72,7 +72,7 @@ def reproduce(
     """
     settings, folder = with_layouts(settings or (QUICK if quick else FULL), seeds), Path(folder)
 
-    def log(name: str, function: Any, trials: Rows, *hidden: str) -> pd.DataFrame:
+    def log(name: str, function: Callable[[dict[str, Any]], Any], trials: Rows, *hidden: str) -> pd.DataFrame:
         return log_trials(function, trials, folder / f"{name}.csv", hidden=("how", *hidden), **how)
 
     places: Rows = log("layouts", find_table, layout_trials(settings)).to_dict("records")  # type: ignore[assignment]
@@ -99,9 +99,8 @@ def find_table(trial: dict[str, Any]) -> dict[str, Any]:
     if trial["condition"] == "Baseline":
         layout = workspace.baseline
     elif trial["condition"] == "Random":
-        genomes = workspace.sample(trial["initial"], np.random.default_rng(trial["layout"]))
-        order = np.argsort(workspace.legibility(genomes), kind="stable")
-        layout, evaluations = workspace.decode(genomes[order[len(order) // 2]]), len(genomes)
+        evaluations = trial["initial"]
+        layout = workspace.decode(median_of_random(workspace, evaluations, np.random.default_rng(trial["layout"])))
     else:
         found = search(
             workspace,
