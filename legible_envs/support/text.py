@@ -1,0 +1,65 @@
+"""Text that people hand over: byte-order marks, line endings and encodings are dealt with here, once."""
+
+from __future__ import annotations
+
+import codecs
+import os
+from pathlib import Path
+from typing import Final
+
+__all__ = ["clean_text", "decode_text", "read_text"]
+
+# The longer marks first: UTF-32's begins with UTF-16's.
+_MARKS: Final = (
+    (codecs.BOM_UTF8, "utf-8"),
+    (codecs.BOM_UTF32_LE, "utf-32-le"),
+    (codecs.BOM_UTF32_BE, "utf-32-be"),
+    (codecs.BOM_UTF16_LE, "utf-16-le"),
+    (codecs.BOM_UTF16_BE, "utf-16-be"),
+)
+
+
+def read_text(path: str | os.PathLike[str]) -> str:
+    r"""Read a text file that a person wrote, with any editor, on any system.
+
+    Returns:
+        The text without byte-order mark; every line ends in ``\n`` alone, but for a last one that had no ending.
+
+    Raises:
+        OSError: The file cannot be read.
+        ValueError: It is not text; says what it looks like.
+    """
+    return decode_text(Path(path).read_bytes(), os.fspath(path))
+
+
+def decode_text(data: bytes, source: str = "the text") -> str:
+    r"""Decode UTF-8, or UTF-16 and UTF-32 that begin with a byte-order mark; unify line endings.
+
+    Args:
+        data: The bytes of a whole text.
+        source: What messages call it, such as the path of its file.
+
+    Raises:
+        ValueError: Bytes of another kind; names ``source``, what was expected and the offending byte with its line.
+    """
+    for mark, encoding in _MARKS:
+        if data.startswith(mark):
+            data = data[len(mark) :]
+            break
+    else:
+        encoding = "utf-8"
+        if b"\0" in data[:4096]:
+            raise ValueError(f"{source} is not text: it holds zero bytes; expected text in UTF-8")
+    try:
+        return clean_text(data.decode(encoding))
+    except UnicodeDecodeError as error:
+        line = data[: error.start].count(b"\n") + 1
+        raise ValueError(
+            f"{source}, line {line}: byte 0x{data[error.start]:02x} is not {encoding.upper()}; "
+            "expected text in UTF-8 (in a spreadsheet: save as 'CSV UTF-8')"
+        ) from error
+
+
+def clean_text(text: str) -> str:
+    r"""A text without byte-order mark, every line ending in ``\n`` alone."""
+    return text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
