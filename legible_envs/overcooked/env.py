@@ -98,8 +98,8 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
 
     +20 for every delivery. A crossing of a soft virtual obstacle costs `crossing_cost`. With `shaping=True`
     (Overcooked-AI's values) also +3 for an ingredient put in a pot, +3 for a dish fetched while a soup waits for one
-    (taken back if it is put back: going to and fro gains nothing), +5 for a soup taken from the pot. A mapping with the
-    keys `ingredient`, `dish`, `soup` sets other values.
+    (taken back if it is put back: going to and fro gains nothing), +5 for a soup taken from the pot. A mapping with
+    some of the keys `ingredient`, `dish`, `soup` sets other values.
 
     ## Starting State
 

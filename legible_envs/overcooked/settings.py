@@ -18,7 +18,7 @@ from legible_envs.overcooked.layout import INGREDIENTS, STATION_TYPES, Overcooke
 from legible_envs.overcooked.layouts import LayoutDistribution, default_layout, read_distribution, read_layout
 from legible_envs.overcooked.recipes import PAPER_SOUPS, check_recipes
 from legible_envs.overcooked.rendering.board import RGB_TILE
-from legible_envs.support.validation import choice, flag, real
+from legible_envs.support.validation import choice, real, switched_weights
 
 __all__ = ["OBS_TYPES", "SHAPING", "KitchenSettings", "PackedKitchen"]
 
@@ -65,7 +65,7 @@ class KitchenSettings:
             cook_time=cook_time,
             soft_obstacles=virtual_obstacles == "soft",
         )
-        bonus = _read_shaping(shaping)
+        bonus = switched_weights("shaping", shaping, SHAPING) or dict.fromkeys(SHAPING, 0.0)
         self.weights = np.array([DELIVERY_REWARD, bonus["ingredient"], bonus["dish"], bonus["soup"], -crossing_cost])
         self.distribution: LayoutDistribution | None = None
         self.layout: OvercookedLayout | None = None
@@ -136,12 +136,3 @@ class KitchenSettings:
             high[..., GRID_CHANNELS.index("tomatoes") + number] = max(most, 1)
         high[..., GRID_CHANNELS.index("ticks cooked")] = max(min(self.rules.cook_time, 255), 1)
         return spaces.Box(np.zeros_like(high), high, dtype=np.uint8)
-
-
-def _read_shaping(shaping: bool | Mapping[str, float]) -> Mapping[str, float]:
-    if isinstance(shaping, Mapping):
-        unknown = sorted(str(key) for key in shaping if key not in SHAPING)
-        if unknown:
-            raise ValueError(f"unknown rewards {unknown} in `shaping`; known: {list(SHAPING)}")
-        return {key: real(f"reward {key!r} of `shaping`", shaping.get(key, 0.0)) for key in SHAPING}
-    return SHAPING if flag("shaping", shaping, also="a mapping of rewards,") else dict.fromkeys(SHAPING, 0.0)

@@ -42,14 +42,10 @@ def decode_text(data: bytes, source: str = "the text") -> str:
     Raises:
         ValueError: Bytes of another kind; names ``source``, what was expected and the offending byte with its line.
     """
-    for mark, encoding in _MARKS:
-        if data.startswith(mark):
-            data = data[len(mark) :]
-            break
-    else:
-        encoding = "utf-8"
-        if b"\0" in data[:4096]:
-            raise ValueError(f"{source} is not text: it holds zero bytes; expected text in UTF-8")
+    mark, encoding = next((known for known in _MARKS if data.startswith(known[0])), (b"", "utf-8"))
+    data = data[len(mark) :]
+    if not mark and b"\0" in data[:4096]:
+        raise ValueError(f"{source} is not text: it holds zero bytes; expected text in UTF-8")
     try:
         return clean_text(data.decode(encoding))
     except UnicodeDecodeError as error:

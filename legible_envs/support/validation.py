@@ -12,7 +12,19 @@ from typing import Any, Literal, TypeVar
 
 import numpy as np
 
-__all__ = ["LARGEST", "choice", "entries", "flag", "integer", "integers", "is_integer", "is_real", "real", "shown"]
+__all__ = [
+    "LARGEST",
+    "choice",
+    "entries",
+    "flag",
+    "integer",
+    "integers",
+    "is_integer",
+    "is_real",
+    "real",
+    "shown",
+    "switched_weights",
+]
 
 T = TypeVar("T")
 Closed = Literal["both", "left", "right", "neither"]
@@ -180,6 +192,32 @@ def flag(name: str, value: object, *, also: str = "", error: MakeError = ValueEr
     if isinstance(value, bool | np.bool_):
         return bool(value)
     raise error(_refusal(name, "True or False", value, also, ""))
+
+
+def switched_weights(name: str, value: object, defaults: Mapping[str, float]) -> dict[str, float] | None:
+    """Weights that are off, on, or set one by one.
+
+    Args:
+        name: Of the argument.
+        value: False or True, or a mapping from names to numbers; names left out keep their default.
+        defaults: Every name with its number.
+
+    Returns:
+        A number for every name; None for False.
+
+    Raises:
+        ValueError: Neither; an unknown name; or no finite number.
+
+    Example:
+        >>> switched_weights("shaping", {"dish": 1}, {"dish": 3.0, "soup": 5.0})
+        {'dish': 1.0, 'soup': 5.0}
+    """
+    if not isinstance(value, Mapping):
+        return dict(defaults) if flag(name, value, also="a mapping of weights,") else None
+    unknown = sorted(str(key) for key in value if key not in defaults)
+    if unknown:
+        raise ValueError(f"unknown weights {unknown} in `{name}`; known: {list(defaults)}")
+    return {key: real(f"weight {key!r} of `{name}`", value.get(key, default)) for key, default in defaults.items()}
 
 
 def entries(value: object) -> list[Any]:

@@ -15,6 +15,7 @@ from legible_envs.errors import LayoutError
 from legible_envs.rollouts.trajectory import Trajectory
 from legible_envs.support.specs import JsonSpec, check_options
 from legible_envs.tabletop.game.game import DT, RATE, TableGame
+from legible_envs.tabletop.game.shaping import Shaping
 from legible_envs.tabletop.game.view import TableView
 from legible_envs.tabletop.layout import TabletopLayout
 from legible_envs.tabletop.observations import ObservationBuilder
@@ -100,6 +101,15 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
     `done_reward` (1) for every subtask that the person or the robot finishes: each object placed. `time_cost` (0.05) per
     second and `crossing_cost` (0) per crossing of a soft obstacle are subtracted.
 
+    A learner that starts from nothing never meets a reward: it would have to stop beside an object, then beside its
+    place. `shaping=True` adds `discount * potential(after) - potential(before)` to every step, where `potential` is
+    `taking` (1) while the hand carries an object, less `placing` (2) for every subtask left and `distance` (2) for
+    every metre of the hand's shortest path to the nearest valid object or, while it carries one, to its place; 0 when
+    the task is done. Potential-based shaping leaves the optimal policies as they are: the return of every finished
+    episode is shifted by the same constant at the default `discount` of 1, and the optima of a learner that discounts
+    are exactly its own at that learner's `discount` (Ng, Harada and Russell 1999); never choose a smaller one, with
+    which waiting pays. A mapping with some of these four keys sets other values.
+
     ## Starting State
 
     Objects lie where the layout has them; the hand is where the task starts (`home`), empty and at rest.
@@ -150,6 +160,7 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
         done_reward: For a finished subtask.
         time_cost: Per second.
         crossing_cost: Per crossing of a soft obstacle.
+        shaping: False, True, or a mapping of weights; see Rewards.
         partner: None, `"robot"`, a mapping of arguments of `RobotPartner`, `"module:Class"`, or an object with its
             methods `reset` and `step`.
         predictor: Predicts the person's goals: `"bayesian"`, the built-in Bayesian goal inference (Eq. 1) along
@@ -192,6 +203,7 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
         done_reward: float = 1.0,
         time_cost: float = 0.05,
         crossing_cost: float = 0.0,
+        shaping: bool | Mapping[str, float] = False,
         partner: object = None,
         predictor: object = None,
         threshold: float = 0.8,
@@ -211,11 +223,13 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
             done_reward=done_reward,
             time_cost=time_cost,
             crossing_cost=crossing_cost,
+            shaping=shaping,
             threshold=threshold,
         )
         start, layout = self.settings.task.graph.start, self.settings.layout
         self._game = TableGame(self.settings.task, self.settings.rules)
         self._game.begin(layout, layout.place(start), start)
+        self._shaping = None if self.settings.shaping is None else Shaping(self._game, self.settings.shaping)
         self._team = self._make_team(partner, predictor)
         self._observations = ObservationBuilder(self.settings.task, max_obstacles, partner is not None)
         self._masks: dict[tuple[str, ...], npt.NDArray[np.bool_]] = {}
@@ -267,6 +281,8 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
             self._check_goal(goal, self._game.progress.first_goals)
         self._chosen = chosen
         self._game.begin(layout, begin.at, begin.name, goal)
+        if self._shaping is not None:
+            self._shaping.begin()
         self._observations.enter(layout)
         self._team.begin(self._game, self.np_random)
         if self.render_mode == "human":
@@ -296,6 +312,8 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
         self._team.sense(game)
         crossed = game.crossings - crossings
         reward = settings.done_reward * finished - settings.time_cost * DT - settings.crossing_cost * crossed
+        if self._shaping is not None:
+            reward += self._shaping.reward()
         if self.render_mode == "human":
             self.render()
         observation, info = self._look()

@@ -12,8 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.errors import LayoutError
-from legible_envs.support.validation import choice, integer, real, shown
+from legible_envs.support.validation import choice, integer, real, shown, switched_weights
 from legible_envs.tabletop.game.game import CONTACTS, GameRules
+from legible_envs.tabletop.game.shaping import SHAPING
 from legible_envs.tabletop.layout import TabletopLayout
 from legible_envs.tabletop.objects import Point, point
 from legible_envs.tabletop.task import TabletopTask, read_task
@@ -155,6 +156,7 @@ class TableSettings:
         done_reward: float,
         time_cost: float,
         crossing_cost: float,
+        shaping: bool | Mapping[str, float],
         threshold: float,
     ) -> None:
         self.task = read_task(task)
@@ -170,6 +172,9 @@ class TableSettings:
         self.done_reward = real("done_reward", done_reward)
         self.time_cost = real("time_cost", time_cost, 0)
         self.crossing_cost = real("crossing_cost", crossing_cost, 0)
+        self.shaping = switched_weights("shaping", shaping, SHAPING)
+        if self.shaping is not None:
+            real("weight 'discount' of `shaping`", self.shaping["discount"], 0, 1)
         self.threshold = real("threshold", threshold, 0, 1)
         self.layout = self.task.layout if layout is None else self.read(layout)
 

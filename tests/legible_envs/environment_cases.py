@@ -186,6 +186,7 @@ VARIANTS = [
     Case("kitchen-random", KITCHEN_ID, {"shape": (5, 6), "layouts": "random"}),
     Case("kitchen-split", KITCHEN_ID, {"layouts": {"kind": "random", "split": "test", "num_layouts": 5}}),
     Case("kitchen-recipes", KITCHEN_ID, {"layout": KITCHEN, "recipes": [["onion", "fish"]], "cook_time": 0}),
+    Case("table-shaping", TABLE_ID, {"layout": WALL, "shaping": {"discount": 0.99}, **SLOW_HAND}),
     Case("table-soft", TABLE_ID, {"layout": WALL, "virtual_obstacles": "soft", "crossing_cost": 1.0, "max_speed": 2.0}),
     Case("table-contact", TABLE_ID, {"layout": WALL, "contact": "always", **SLOW_HAND}),
     Case("table-belief", TABLE_ID, {"task": "tea", "contact": "never", "predictor": "bayesian", "max_speed": 2.0}),

@@ -266,7 +266,8 @@ def test_shaping_pays_for_each_stage():
         return rewards
 
     assert total(True) == 60 + 9 * 3 + 3 * 3 + 3 * 5
-    assert total({"dish": 0.5}) == 60 + 3 * 0.5
+    assert total({"dish": 0.5}) == 60 + 9 * 3 + 3 * 0.5 + 3 * 5
+    assert total({"ingredient": 0, "dish": 0.5, "soup": 0}) == 60 + 3 * 0.5
     assert total(False) == 60
 
 
