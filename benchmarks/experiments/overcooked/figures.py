@@ -12,6 +12,7 @@ from benchmarks.experiments.conditions import slug
 from benchmarks.experiments.figures import bars_by_condition, save_accuracy, save_learning
 from benchmarks.experiments.overcooked import tables
 from benchmarks.experiments.overcooked.sweep import CONDITIONS
+from benchmarks.presenters.overcooked import DOUBT
 from legible_envs.drawing.chart_parts import number_squares
 from legible_envs.drawing.charts import SOFT, Chart, ChartSize, save_figure, styled
 from predictors.evaluation.figures import confusion_figure
@@ -129,7 +130,7 @@ def boards(best: pd.DataFrame) -> Any:
 
     kitchens = [OvercookedLayout.from_ascii(drawing) for drawing in best["drawing"]]
     return draw_side_by_side(
-        [draw_ambiguity(kitchen, ambiguity(kitchen), tile=TILE) for kitchen in kitchens],
+        [draw_ambiguity(kitchen, ambiguity(kitchen), tile=TILE, legend=DOUBT) for kitchen in kitchens],
         list(best["condition"]),
         [
             f"legibility {score:.1f}\ndistance {distance:.0f} steps"
