@@ -106,9 +106,8 @@ class Kitchen(Design):
         """The kitchen with, on each cell, how often an observer would predict a wrong goal."""
         from legible_envs.overcooked.rendering import draw_ambiguity
 
-        return draw_ambiguity(
-            self.layout, self.ambiguity(), tile=72, legend=DOUBT, title="How often a wrong goal is predicted"
-        )
+        title = "How often a wrong goal is predicted"
+        return draw_ambiguity(self.layout, self.ambiguity(), tile=72, legend=DOUBT, title=title)
 
     def predictors(self) -> list[tuple[str, GoalPredictor]]:
         """The heuristic, and Bayesian goal inference."""
@@ -168,7 +167,8 @@ class KitchenPresenter(Presenter):
         axes={"obstacles": "virtual obstacles", "order": "reading order of the ingredients"},
         archive="with that many virtual obstacles (up) and its ingredients in that reading order (across)",
         panels="The same room and the same task. The darker a floor cell, the more often an observer who sees the cook "
-        "there predicts a wrong goal; cells without colour are on no path. A legible kitchen gives the goal away early.",
+        "there predicts a wrong goal; cells without colour are on no path. A legible kitchen gives the goal away "
+        "early.",
         distance="expected steps of one task",
         distance_unit="steps",
         distance_digits=1,

@@ -40,7 +40,7 @@ def significant(value: float, digits: int = 4, *, scale: float = 0.0) -> str:
         return DASH if math.isnan(value) else _infinite(value)
     if abs(value) < max(_NOTHING, 1e-9 * scale):
         return "0"
-    if abs(value) >= 10**digits:
+    if abs(value) >= 10 ** (digits - 1):
         return fixed(value, 0)
     if abs(value) < 1e-4:
         mantissa, exponent = f"{value:.{digits - 1}e}".split("e")

@@ -22,7 +22,6 @@ _HEADINGS: Final = {
     "df1": "df 1",
     "df2": "df 2",
     "eta_squared": "η²",
-    "f1": "F1",
     "hedges_g": "Hedges’ g",
     "p_corrected": "p, corrected",
     "p_holm": "p, Holm",
@@ -106,7 +105,8 @@ def table_of(
 
 def heading(name: str) -> str:
     """The name of a column in words."""
-    return _HEADINGS.get(name, name.replace("_", " "))
+    words = _HEADINGS.get(name, name.replace("_", " "))
+    return words.replace("f1", "F1", 1) if words.startswith("f1") else words
 
 
 def _is_number(value: Any) -> bool:

@@ -33,7 +33,7 @@ __all__ = ["report_data", "write_best_image", "write_report"]
 
 MAX_LAYOUTS = 1_000
 """At most so many cells, the best ones, carry their layouts."""
-LAYOUT_BYTES = 150_000
+LAYOUT_BYTES = 120_000
 """And at most so many bytes of layouts, so that large kitchens do not outgrow the page."""
 MAX_ROWS, MAX_COLUMNS = 80, 120
 """Finer archives are drawn with several cells in one, each showing the best of them."""
@@ -181,7 +181,7 @@ def _cell_labels(low: float, high: float, count: int) -> list[str]:
 def _cells(
     run: SearchResult, elites: Elites, presenter: Presenter, rows: int, columns: int
 ) -> tuple[list[list[Any]], npt.NDArray[Any]]:
-    """The archive as ``[row, column, objective, legibility, distance, layout or None]``, best first, and its genomes."""
+    """The archive as ``[row, column, objective, legibility, distance, layout or None]``, best first, and genomes."""
     steps = (math.ceil(rows / MAX_ROWS), math.ceil(columns / MAX_COLUMNS))
     drawn: dict[tuple[int, int], int] = {}
     for i, index in enumerate(elites.index):
@@ -195,9 +195,9 @@ def _cells(
     cells = [
         [
             *cell,
-            _plain(elites.objective[i]),
-            _plain(legibility[n]),
-            _plain(distance[n]),
+            _plain(elites.objective[i], 8),
+            _plain(legibility[n], 8),
+            _plain(distance[n], 8),
             presenter.encode(run.workspace.decode(genomes[n])) if n < carried else None,
         ]
         for n, (cell, i) in enumerate(drawn.items())
@@ -228,7 +228,7 @@ def _panel(panel: Panel, presenter: Presenter, workspace: Any) -> dict[str, Any]
 
 
 def _explained(rows: Sequence[Mapping[str, Any]]) -> list[tuple[str, list[dict[str, Any]]]]:
-    """The rows that lose and win most, for reading, under a heading each; headings are empty where rows are no stages."""
+    """The rows that lose and win most, under a heading each; without headings where rows are no stages."""
     if not explains_stages(rows):
         shown = (*rows[:WORST_ROWS], *rows[WORST_ROWS:][-BEST_ROWS:])
         return [("", [loss_row(row) for row in shown])] if shown else []
@@ -237,8 +237,8 @@ def _explained(rows: Sequence[Mapping[str, Any]]) -> list[tuple[str, list[dict[s
     return [(name, [loss_row(row) for row in part]) for name, part in groups if part]
 
 
-def _plain(value: Any) -> Any:
-    """The same in types that JSON has; numbers to ten digits, so that no place rounds another one's rounding."""
+def _plain(value: Any, digits: int = 10) -> Any:
+    """The same in types that JSON has; numbers to so many digits that pages do not round what is rounded already."""
     if isinstance(value, np.ndarray):
         return _plain(value.tolist())
     if isinstance(value, Mapping):
@@ -250,7 +250,7 @@ def _plain(value: Any) -> Any:
     if isinstance(value, int | np.integer):
         return int(value)
     if isinstance(value, float | np.floating):
-        return float(f"{value:.10g}") if math.isfinite(value) else None
+        return float(f"{value:.{digits}g}") if math.isfinite(value) else None
     return value if value is None or isinstance(value, str) else str(value)
 
 

@@ -6,6 +6,7 @@ pictures show.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Sequence
 from typing import Final, Protocol
@@ -120,7 +121,7 @@ def _at(length: float) -> int:
 def _path(points: Sequence[Point]) -> str:
     """A path through points: the first as it is, the others as steps, which are shorter to write."""
     pixels = [(_at(x), _at(y)) for x, y in points]
-    steps = [f"{b[0] - a[0]} {b[1] - a[1]}" for a, b in zip(pixels, pixels[1:], strict=False)]
+    steps = [f"{b[0] - a[0]} {b[1] - a[1]}" for a, b in itertools.pairwise(pixels)]
     return f"M{pixels[0][0]} {pixels[0][1]}l{' '.join(steps)}".replace(" -", "-")
 
 

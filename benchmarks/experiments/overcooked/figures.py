@@ -133,9 +133,10 @@ def boards(best: pd.DataFrame) -> Any:
         [draw_ambiguity(kitchen, ambiguity(kitchen), tile=TILE, legend=DOUBT) for kitchen in kitchens],
         list(best["condition"]),
         [
-            f"legibility {score:.1f}\ndistance {distance:.0f} steps"
+            f"legibility {score:.1f}\ndistance {distance:.0f} steps".replace("-", "\u2212")
             for score, distance in zip(best["score"], best["distance"], strict=True)
         ],
+        columns=2,
     )
 
 
@@ -154,7 +155,7 @@ def rewards(best: pd.DataFrame, costs: pd.DataFrame) -> Any:
         heat = (reward - low) / (high - low) if high - low > 1e-12 else np.where(np.isnan(reward), np.nan, 0.5)
         ends = f"reward {low:.2f}".replace("-", "\u2212"), f"{high:.2f}".replace("-", "\u2212")
         pictures.append(draw_ambiguity(kitchen, np.clip(heat, 0, 1), tile=TILE, legend=ends))
-    return draw_side_by_side(pictures, list(best["condition"]), None)
+    return draw_side_by_side(pictures, list(best["condition"]), None, columns=2)
 
 
 # -- all of them ------------------------------------------------------------------------------------------------------
