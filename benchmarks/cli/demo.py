@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from benchmarks.console import number, table
+from benchmarks.console import table
 from benchmarks.presenters.base import Panel
 from benchmarks.presenters.overcooked import DOUBT, RANDOM_LAYOUTS, panels_text
+from benchmarks.reports.numbers import fixed
 from benchmarks.reports.search_report import write_best_image, write_report
 
 if TYPE_CHECKING:
@@ -133,7 +134,7 @@ def write_panels_image(out: Path, workspace: OvercookedWorkspace, found: list[Pa
         draw_side_by_side(
             [draw_ambiguity(p.layout, workspace.ambiguity(p.layout), tile=44, legend=DOUBT) for p in found],
             [p.name for p in found],
-            [f"legibility {number(p.score, 1)}\ndistance {number(p.distance, 0)} steps" for p in found],
+            [f"legibility {fixed(p.score, 1)}\ndistance {fixed(p.distance, 0)} steps" for p in found],
         ),
     )
 

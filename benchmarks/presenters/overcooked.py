@@ -247,6 +247,7 @@ class KitchenPresenter(Presenter):
     def panels(self, run: SearchResult) -> Sequence[Panel]:
         """A middle one of random kitchens (or that the search began with), the shortest one, and the best one."""
         workspace: Any = run.workspace
+        best = run.require_genome()
         name = WANTED.get(run.config["objective"]["name"], "best")
         found = [_first_panel(workspace)]  # drawn anew: a run keeps no random layouts
         elites = run.elites()
@@ -256,7 +257,7 @@ class KitchenPresenter(Presenter):
         else:
             shortest = elites.solution[int(np.argmin(workspace.distance(elites.solution)))]
             found.append(panel_of(workspace, "shortest", shortest, "the shortest task in the archive"))
-        return [*found, panel_of(workspace, name, run.require_genome(), "the best layout of this search")]
+        return [*found, panel_of(workspace, name, best, "the best layout of this search")]
 
     def about_panels(self, panels: Sequence[Panel]) -> str:
         """What the colours mean, and what legibility costs in steps."""

@@ -120,9 +120,11 @@ class TableDesign(Design):
         """The table with its shortest reaches, coloured by how unsure an observer is of their goal."""
         from legible_envs.tabletop.rendering import draw_table
 
-        return draw_table(
-            self.layout, task=self.task, width=960, ambiguity=True, beta=beta_of(self.workspace), grown=True
-        )
+        title = "Shortest reaches, by how ambiguous their goal is"
+        if self.layout.obstacles:
+            title += "; pale: the middle of the hand keeps out"
+        beta = beta_of(self.workspace)
+        return draw_table(self.layout, task=self.task, width=960, ambiguity=True, beta=beta, grown=True, title=title)
 
     def write_picture(self, path: Path | None) -> tuple[str, Path] | None:
         """For a run the figure of its panels, into its folder unless told otherwise; else the table."""

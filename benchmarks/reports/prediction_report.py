@@ -303,10 +303,16 @@ def evaluation_section(folder: Path) -> str | None:
             about=about,
             figures=figures,
             summary=table_of([("", about["summary"])], 3),
-            comparisons=[(each, table_of([("", each["pairs"])], 3)) for each in about["comparisons"]],
+            comparisons=[(each, table_of([("", _in_words(each["pairs"]))], 3)) for each in about["comparisons"]],
         )
     except (OSError, ValueError, KeyError, TypeError):
         return None
+
+
+def _in_words(pairs: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Rows of pairs with columns that say what they hold."""
+    words = {"a": "first", "b": "second", "difference": "first − second", "low": "95 % from", "high": "95 % to"}
+    return [{words.get(key, key): value for key, value in row.items()} for row in pairs]
 
 
 def _as_image(path: Path) -> str:

@@ -20,7 +20,7 @@ import numpy.typing as npt
 from benchmarks.presenters.base import Panel, Presenter, summary_of, template
 from benchmarks.presenters.losses import explains_stages, loss_row, losses_and_gains
 from benchmarks.presenters.registry import presenter_of_run
-from benchmarks.reports.numbers import fixed
+from benchmarks.reports.numbers import fixed, significant
 from benchmarks.reports.pages import PageTable, page_environment, table_of
 from benchmarks.reports.prediction_report import FOLDER, evaluation_section
 from benchmarks.reports.variety import pick_varied
@@ -195,9 +195,9 @@ def _cells(
     cells = [
         [
             *cell,
-            _plain(elites.objective[i], 8),
-            _plain(legibility[n], 8),
-            _plain(distance[n], 8),
+            _plain(elites.objective[i]),
+            _plain(legibility[n]),
+            _plain(distance[n]),
             presenter.encode(run.workspace.decode(genomes[n])) if n < carried else None,
         ]
         for n, (cell, i) in enumerate(drawn.items())
@@ -237,8 +237,8 @@ def _explained(rows: Sequence[Mapping[str, Any]]) -> list[tuple[str, list[dict[s
     return [(name, [loss_row(row) for row in part]) for name, part in groups if part]
 
 
-def _plain(value: Any, digits: int = 10) -> Any:
-    """The same in types that JSON has; numbers to so many digits that pages do not round what is rounded already."""
+def _plain(value: Any) -> Any:
+    """The same in types that JSON has; numbers to eight digits, so that pages round what is hardly rounded."""
     if isinstance(value, np.ndarray):
         return _plain(value.tolist())
     if isinstance(value, Mapping):
@@ -250,7 +250,7 @@ def _plain(value: Any, digits: int = 10) -> Any:
     if isinstance(value, int | np.integer):
         return int(value)
     if isinstance(value, float | np.floating):
-        return float(f"{value:.{digits}g}") if math.isfinite(value) else None
+        return float(f"{value:.8g}") if math.isfinite(value) else None
     return value if value is None or isinstance(value, str) else str(value)
 
 
@@ -348,7 +348,7 @@ def _figures(data: dict[str, Any], presenter: Presenter) -> list[tuple[str, str,
             else []
         ),
         ("Distance", fixed(best.get("distance"), texts.distance_digits), texts.distance),
-        *([("Mean detour", fixed(best["mean_detour"]), "of the straight line")] if "mean_detour" in best else []),
+        *([("Mean detour", fixed(best["mean_detour"]), "times the straight line")] if "mean_detour" in best else []),
         ("Evaluations", fixed(evaluations, 0), f"seed {config.get('seed')}"),
         (
             "Archive",
@@ -388,7 +388,9 @@ def _words(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):
-        return f"{value:.6g}"
+        return significant(value, 6)
+    if isinstance(value, int):
+        return fixed(value, 0)
     return "" if value is None else str(value)
 
 
