@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import numbers
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
 
 from benchmarks.reports.numbers import fixed, p_value, scale_of, significant
 
@@ -110,17 +113,13 @@ def heading(name: str) -> str:
 
 
 def _is_number(value: Any) -> bool:
-    import numbers
-
-    return isinstance(value, numbers.Real) and not isinstance(value, bool) and type(value).__name__ != "bool_"
+    return isinstance(value, numbers.Real) and not isinstance(value, bool | np.bool_)
 
 
 def _cell(value: Any, name: str, scale: float, digits: Any) -> str:
-    import numbers
-
     if value is None or value != value:
         return fixed(None)
-    if isinstance(value, bool) or type(value).__name__ == "bool_":
+    if isinstance(value, bool | np.bool_):
         return "yes" if value else "no"
     if isinstance(value, numbers.Integral):
         return fixed(int(value), 0)
