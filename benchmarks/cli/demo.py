@@ -187,8 +187,8 @@ def _summed_up(scores: pd.DataFrame) -> dict[str, Any]:
         "note": (
             f"{sum(row[1] for row in rows):,} recorded trajectories of real players (Carroll et al., NeurIPS 2019) in "
             f"{len(kitchens)} kitchens that were not designed to be legible. Accuracy by share observed "
-            f"(in {scores.attrs['cut']}), ties shared out; every dispenser in reach is a candidate. Neither predictor has "
-            "learned anything from these players; chance is a guess among the candidates. The table averages over "
+            f"(in {scores.attrs['cut']}), ties shared out; every dispenser in reach is a candidate. Neither predictor "
+            "has learned anything from these players; chance is a guess among the candidates. The table averages over "
             f"{fractions[0]:.0%} to {fractions[-1]:.0%}."
         ),
         "fractions": fractions,

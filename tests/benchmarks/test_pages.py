@@ -119,7 +119,7 @@ def panel(name: str, distance: float) -> Panel:
         (
             113.8,
             64.1,
-            "Its price is distance: 113.8 steps for one task, 78 % more than the 64.1 steps in the efficient",
+            "Its price is distance: 113.8 steps for one task, 78 % more than the 64.1 steps in the",
         ),
         (64.4, 64.1, "64.4 steps for one task, less than 1 % more than the 64.1 steps"),
     ],
