@@ -10,6 +10,7 @@ from html import unescape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from benchmarks.reports.numbers import with_minus
 from benchmarks.reports.pages import page_environment, table_of
 from legible_envs import __version__
 from legible_envs.support.files import write_text
@@ -21,8 +22,6 @@ __all__ = ["Section", "write_experiment_report", "write_table", "write_tables"]
 
 LONG: Final = 24
 """Rows from which on a table is folded up."""
-_MINUS: Final = re.compile(r"(?<![\w.,)-])-(?=\.?\d)")
-"""A minus sign before a number, not a hyphen or a range."""
 _KINDS: Final = {".png": "image/png", ".svg": "image/svg+xml"}
 
 
@@ -72,10 +71,8 @@ def _with_code(text: str) -> Any:
 
     parts = text.split("`")
     if len(parts) % 2 == 0:
-        return escape(_MINUS.sub("\u2212", text))
-    marked = (
-        Markup("<code>{}</code>").format(p) if i % 2 else escape(_MINUS.sub("\u2212", p)) for i, p in enumerate(parts)
-    )
+        return escape(with_minus(text))
+    marked = (Markup("<code>{}</code>").format(p) if i % 2 else escape(with_minus(p)) for i, p in enumerate(parts))
     return Markup("").join(marked)
 
 

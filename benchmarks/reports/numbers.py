@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable
 from typing import Any, Final
 
 from benchmarks.console import number
 
-__all__ = ["DASH", "fixed", "p_value", "scale_of", "significant"]
+__all__ = ["DASH", "fixed", "p_value", "scale_of", "significant", "with_minus"]
 
 DASH: Final = "–"
 """Stands where there is no number."""
 _MINUS, _THIN, _TIMES = "\u2212", "\u202f", "\u00d7"
+_NEGATIVE: Final = re.compile(r"(?<![\w.,)-])-(?=\.?\d)")
 _NOTHING: Final = 1e-12
 """What is smaller than this, or than a billionth of the largest in its column, is a rounding error, not a result."""
 
@@ -58,6 +60,11 @@ def p_value(value: float) -> str:
 def scale_of(values: Iterable[Any]) -> float:
     """The largest finite magnitude of a column; 0 where there is none."""
     return max((abs(v) for v in values if isinstance(v, int | float) and math.isfinite(v)), default=0.0)
+
+
+def with_minus(text: str) -> str:
+    """A text whose negative numbers have a true minus sign; hyphens and ranges stay."""
+    return _NEGATIVE.sub(_MINUS, text)
 
 
 def _infinite(value: float) -> str:

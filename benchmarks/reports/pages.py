@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from benchmarks.reports.numbers import fixed, p_value, scale_of, significant
+from benchmarks.reports.numbers import fixed, p_value, scale_of, significant, with_minus
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -127,7 +127,7 @@ def _cell(value: Any, name: str, scale: float, digits: Any) -> str:
         if name in _PROBABILITIES:
             return p_value(float(value))
         return significant(float(value), scale=scale) if digits is None else fixed(float(value), digits)
-    return str(value)
+    return with_minus(str(value))
 
 
 @lru_cache(maxsize=1)

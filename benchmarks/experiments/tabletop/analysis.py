@@ -117,7 +117,7 @@ def _accuracy_sections(
             "How much reaches differ",
             narrative.about_spread(found["spread"], found["published_spread"]),
             {
-                "Determinant (m^4) and trace (m^2) beside the paper": found["published_spread"],
+                "Determinant (m⁴) and trace (m²) beside the paper": found["published_spread"],
                 "By alignment": found["spread"],
             },
             drawn["spread"],
