@@ -58,7 +58,7 @@ function makePlace(data, { svg, plural, heat }) {
   const seen = Object.keys(STATIONS).filter((symbol) => data.cells.some((one) => one[5] && one[5].includes(symbol)) || data.panels.some((panel) => panel.layout.includes(symbol)));
   const codes = seen.filter((symbol) => coded.has(symbol)).map((symbol) => [symbol, STATIONS[symbol], onCounter(symbol)]);
   const bits = [...Array(8).keys()].map((bit) => `edge-${bit}`);
-  const codesAbout = "Ingredients row by row from the top left:";
+  const codesAbout = `${["D", "P", "S"].some((symbol) => coded.has(symbol)) ? "Stations" : "Ingredients"} row by row from the top left:`;
   const others = seen.filter((symbol) => !coded.has(symbol)).map((symbol) => [onCounter(symbol), STATIONS[symbol]]);
   const marks = [...others, [sample("floor-00", "light", ...bits), "virtual obstacle: light on the floor that nobody crosses"]];
   const doubt = { title: "How often an observer who sees the cook there predicts a wrong goal", low: "never", high: "always" };
