@@ -282,21 +282,27 @@
     text.textContent = words;
     canvas.append(text);
   };
-  const compact = (v) => Math.abs(v) >= 1e6 ? number(v / 1e6, v % 1e6 ? 1 : 0) + " M" : Math.abs(v) >= 1e4 ? number(v / 1e3, v % 1e3 ? 1 : 0) + " k" : number(v, v % 1 ? (Math.abs(v) < 1 ? 2 : 1) : 0);
+  // As many decimals as the steps between ticks need, so that equal steps look equal.
+  function decimals(list) {
+    const step = list.length > 1 ? list[1] - list[0] : 1;
+    return [0, 1, 2, 3].find((digits) => Math.abs(step * 10 ** digits - Math.round(step * 10 ** digits)) < 1e-6) ?? 4;
+  }
+  const compact = (v, digits = v % 1 ? (Math.abs(v) < 1 ? 2 : 1) : 0) => Math.abs(v) >= 1e6 ? number(v / 1e6, v % 1e6 ? 1 : 0) + " M" : Math.abs(v) >= 1e4 ? number(v / 1e3, v % 1e3 ? 1 : 0) + " k" : number(v, digits);
   function axes(frame, xs, [bottom, top], { format = compact, formatX = compact, label = "" }) {
     const { width, height, left, under: below } = frame;
     const x = (v) => left + (v - xs[0]) / (xs[xs.length - 1] - xs[0] || 1) * (width - left - 8);
     const y = (v) => height - below - (v - bottom) / (top - bottom || 1) * (height - below - 8);
     const canvas = svg("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": label });
-    for (const v of ticks(bottom, top)) {
+    const up = ticks(bottom, top), along = ticks(xs[0], xs[xs.length - 1]);
+    for (const v of up) {
       canvas.append(svg("line", { class: "grid", x1: left, x2: width - 8, y1: y(v), y2: y(v) }));
       const text = svg("text", { x: left - 6, y: y(v) + 4, "text-anchor": "end" });
-      text.textContent = format(v);
+      text.textContent = format(v, decimals(up));
       canvas.append(text);
     }
-    for (const v of ticks(xs[0], xs[xs.length - 1])) {
+    for (const v of along) {
       const text = svg("text", { x: Math.min(x(v), width - 14), y: height - below + 18, "text-anchor": "middle" });
-      text.textContent = formatX(v);
+      text.textContent = formatX(v, decimals(along));
       canvas.append(text);
     }
     return { canvas, x, y };
