@@ -13,7 +13,7 @@ import heapq
 import math
 from collections import defaultdict
 from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple, TypeVar
 
 from legible_envs.observer import ObserverModel, PrefixSpec
@@ -166,6 +166,7 @@ class PrefixScore:
         weight: Weight of this prefix in the trajectory's score.
         tied: Goals at the top of the posterior.
         value: Eq. 2.
+        belief: Eq. 1, the probability of each goal.
     """
 
     step: int
@@ -175,6 +176,7 @@ class PrefixScore:
     weight: float
     tied: tuple[Hashable, ...]
     value: float
+    belief: Mapping[Hashable, float] = field(default_factory=dict)
 
 
 def goal_legibility(
@@ -224,7 +226,8 @@ def goal_legibility(
                 remaining = {g: costs[g].get(node, math.inf) for g in goals}
                 value = env_legibility(goal, remaining, optimal, step, observer)
                 tied = tuple(tied_goals(remaining, optimal, observer.tie_tolerance))
-                scores.append(PrefixScore(step, node, length, probability, weights[step - 1], tied, value))
+                belief = posterior(remaining, optimal, observer.beta)
+                scores.append(PrefixScore(step, node, length, probability, weights[step - 1], tied, value, belief))
     return scores
 
 

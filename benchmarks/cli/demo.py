@@ -16,7 +16,8 @@ import numpy.typing as npt
 
 from benchmarks.console import table
 from benchmarks.presenters.base import Panel
-from benchmarks.presenters.overcooked import panels_text
+from benchmarks.presenters.overcooked import DOUBT, RANDOM_LAYOUTS, panels_text
+from benchmarks.reports.numbers import fixed
 from benchmarks.reports.search_report import write_best_image, write_report
 
 if TYPE_CHECKING:
@@ -33,7 +34,6 @@ EVALUATIONS = 600_000
 """Of the search for legibility."""
 EFFICIENT_EVALUATIONS = 60_000
 """Of the search for efficiency, which is easy: it levels off after some 20,000."""
-RANDOM_LAYOUTS = 1_000
 
 
 def run_demo(
@@ -110,7 +110,7 @@ def make_panels(workspace: Workspace, best: npt.NDArray[Any], *, seed: int, eval
         seed: Seed of the random layouts and of the search for efficiency.
         evaluations: Layouts that search scores.
     """
-    from benchmarks.experiments.running import median_of_random
+    from benchmarks.presenters.panels import median_of_random, panel_of
     from optimizers import search
 
     median = median_of_random(workspace, RANDOM_LAYOUTS, np.random.default_rng(seed))
@@ -119,22 +119,10 @@ def make_panels(workspace: Workspace, best: npt.NDArray[Any], *, seed: int, eval
     ).best_genome
     assert efficient is not None  # efficiency is defined for every valid layout
     return [
-        _panel(workspace, "random", median, f"the median of {RANDOM_LAYOUTS:,} random layouts by legibility"),
-        _panel(workspace, "efficient", efficient, "the shortest task that a search found"),
-        _panel(workspace, "legible", best, "the best layout of this search"),
+        panel_of(workspace, "random", median, f"the median of {RANDOM_LAYOUTS:,} random layouts by legibility"),
+        panel_of(workspace, "efficient", efficient, "the shortest task that a search found"),
+        panel_of(workspace, "legible", best, "the best layout of this search"),
     ]
-
-
-def _panel(workspace: Workspace, name: str, genome: npt.NDArray[Any], note: str) -> Panel:
-    summary = workspace.summary(genome)
-    return Panel(
-        name=name,
-        layout=workspace.decode(genome),
-        score=summary["score"],
-        distance=summary["distance"],
-        normalised=summary["normalised"],
-        note=note,
-    )
 
 
 def write_panels_image(out: Path, workspace: OvercookedWorkspace, found: list[Panel]) -> Path:
@@ -144,9 +132,9 @@ def write_panels_image(out: Path, workspace: OvercookedWorkspace, found: list[Pa
     return save_png(
         out / "boards.png",
         draw_side_by_side(
-            [draw_ambiguity(p.layout, workspace.ambiguity(p.layout), tile=44) for p in found],
+            [draw_ambiguity(p.layout, workspace.ambiguity(p.layout), tile=44, legend=DOUBT) for p in found],
             [p.name for p in found],
-            [f"legibility {p.score:.1f}\ndistance {p.distance:.0f} steps" for p in found],
+            [f"legibility {fixed(p.score, 1)}\ndistance {fixed(p.distance, 0)} steps" for p in found],
         ),
     )
 
@@ -199,8 +187,9 @@ def _summed_up(scores: pd.DataFrame) -> dict[str, Any]:
         "note": (
             f"{sum(row[1] for row in rows):,} recorded trajectories of real players (Carroll et al., NeurIPS 2019) in "
             f"{len(kitchens)} kitchens that were not designed to be legible. Accuracy by share observed "
-            f"(in {scores.attrs['cut']}), ties shared out; every dispenser in reach is a candidate. The table averages "
-            f"over {fractions[0]:.0%} to {fractions[-1]:.0%}."
+            f"(in {scores.attrs['cut']}), ties shared out; every dispenser in reach is a candidate. Neither predictor "
+            "has learned anything from these players; chance is a guess among the candidates. The table averages over "
+            f"{fractions[0]:.0%} to {fractions[-1]:.0%}."
         ),
         "fractions": fractions,
         "curves": [{"label": p, "values": [float(curve[p, f]) for f in fractions]} for p in predictors],

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from benchmarks.console import number, table
-from benchmarks.presenters.losses import explains_stages, loss_row
+from benchmarks.presenters.losses import explains_stages, loss_row, losses_and_gains
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -52,10 +52,10 @@ def _print_explanation(console: Console, design: Design) -> None:
             console.print("\nWhere the score comes from", style="bold")
             console.print(table([loss_row(row) for row in rows[: WORST_ROWS + BEST_ROWS]]))
         return
-    worst, best = rows[:WORST_ROWS], rows[WORST_ROWS:][: -BEST_ROWS - 1 : -1]
-    console.print("\nReaches that lose most (contributions sum to the score)", style="bold")
+    worst, best, title = losses_and_gains(rows, WORST_ROWS, BEST_ROWS)
+    console.print(f"\n{title} (contributions sum to the score)", style="bold")
     console.print(table([loss_row(row) for row in worst]))
-    if rest := rows[WORST_ROWS : len(rows) - len(best)]:
+    if rest := rows[len(worst) : len(rows) - len(best)]:
         total = math.fsum(row["contribution"] for row in rest)
         console.print(f"and {len(rest)} more reaches, together {number(total)}", style="dim")
     if best:

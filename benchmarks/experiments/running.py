@@ -1,4 +1,4 @@
-"""Steps that experiments share: run trials, log their rows, take as many layouts as asked for, and a random one."""
+"""Steps that experiments share: run trials, log their rows, and take as many layouts as asked for."""
 
 from __future__ import annotations
 
@@ -6,9 +6,6 @@ import dataclasses
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypedDict, TypeVar, Unpack
-
-import numpy as np
-import numpy.typing as npt
 
 from benchmarks.reports.experiment_report import write_table
 from benchmarks.trials import Event, run_trials
@@ -18,9 +15,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from benchmarks.trials.store import Trial
-    from legible_envs.workspace import Workspace
 
-__all__ = ["Rows", "RunOptions", "log_trials", "median_of_random", "with_layouts"]
+__all__ = ["Rows", "RunOptions", "log_trials", "with_layouts"]
 
 
 class RunOptions(TypedDict, total=False):
@@ -60,13 +56,6 @@ def log_trials(
     rows = run_trials(function, trials, path.parent, **how)
     write_table(path, rows.drop(columns=[name for name in rows if str(name).split(".")[0] in hidden]))
     return rows
-
-
-def median_of_random(workspace: Workspace, count: int, rng: np.random.Generator) -> npt.NDArray[Any]:
-    """``(d,)`` the genome that is the median by legibility of so many random layouts."""
-    genomes = workspace.sample(count, rng)
-    order = np.argsort(workspace.legibility(genomes), kind="stable")
-    return np.asarray(genomes[order[len(order) // 2]])
 
 
 class _HasLayouts(Protocol):

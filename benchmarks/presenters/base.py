@@ -86,7 +86,7 @@ class ReportTexts:
         axes: Measures in words, by their names.
         archive: Ends the sentence "Each square is the best layout found …".
         panels: What the layouts side by side have in common, and what to look for.
-        best: Which layouts "The best layouts" shows.
+        best: Anything to add to how "Good layouts that differ" were chosen.
         distance: Name of the distance.
         distance_unit: Its unit; empty where it has none.
         distance_digits: Decimals of a distance.
@@ -97,7 +97,7 @@ class ReportTexts:
     axes: Mapping[str, str] = field(default_factory=dict)
     archive: str = "at that place of the two measures"
     panels: str = "The same task in other layouts."
-    best: str = "The best layout of each column of the map, for the highest-scoring ones."
+    best: str = ""
     distance: str = "of one task"
     distance_unit: str = ""
     distance_digits: int = 2
@@ -319,19 +319,26 @@ class Presenter:
         return room // max(len(json.dumps(layout)) + 1 for layout in sample)
 
     def paths(self, workspace: Any, layout: Any) -> list[Any]:
-        """How people move in a layout, as the script reads it; nothing unless a workspace has such."""
+        """How people move in a layout and where their goal is in doubt, as the script reads it; by default nothing."""
         return []
 
     def panels(self, run: SearchResult) -> Sequence[Panel]:
         """Layouts to show side by side, found in the run's folder; none unless a workspace has such."""
         return ()
 
+    def about_panels(self, panels: Sequence[Panel]) -> str:
+        """What those layouts have in common, what to look for, and what their numbers say; by default the text."""
+        return self.texts.panels
+
     def script(self) -> str:
         """JavaScript that defines ``makePlace(data, tools)``, which draws layouts on the page.
 
-        ``data`` is the report's data, ``data.place`` being :meth:`place`; ``tools`` are ``svg``, ``el``, ``number`` and
-        ``plural``. It returns ``board(layout, paths)``, an element; ``asText(layout)``; ``inWords(label)`` of an axis;
-        and optionally ``obstacles(layout)``, their number.
+        ``data`` is the report's data, ``data.place`` being :meth:`place`; ``tools`` are ``svg``, ``el``, ``number``,
+        ``plural`` and ``heat``, the colour of a share. It returns ``board(layout, paths)``, an element;
+        ``asText(layout)``; ``inWords(label)`` of an axis; and optionally ``obstacles(layout)``, their number;
+        ``codes``, what labels of axes are made of: ``[code, word, element]`` each; ``codesAbout``, how they are read;
+        ``marks``, what is drawn on boards: ``[element, words]`` each; and ``doubt``, what the colours of :meth:`paths`
+        mean: ``{title, low, high}``.
         """
         return template("plain.js")
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 import click
 import numpy as np
@@ -21,6 +21,7 @@ from benchmarks.presenters.base import (
     template,
     workspace_of_run,
 )
+from benchmarks.presenters.panels import median_of_random, panel_of, price_of
 from benchmarks.presenters.registry import load_design
 from legible_envs.errors import LayoutError
 from legible_envs.overcooked.layout import OvercookedLayout
@@ -36,7 +37,12 @@ if TYPE_CHECKING:
     from optimizers import SearchResult
     from predictors import GoalPredictor
 
-__all__ = ["Kitchen", "KitchenPresenter", "kitchen_from", "load_kitchen", "panels_text"]
+__all__ = ["DOUBT", "RANDOM_LAYOUTS", "Kitchen", "KitchenPresenter", "kitchen_from", "load_kitchen", "panels_text"]
+
+DOUBT: Final = ("never wrong", "always wrong")
+"""What the ends of the scale of doubt mean, in pictures."""
+RANDOM_LAYOUTS: Final = 1_000
+"""Random layouts whose median the best one is shown beside."""
 
 
 class Kitchen(Design):
@@ -100,7 +106,8 @@ class Kitchen(Design):
         """The kitchen with, on each cell, how often an observer would predict a wrong goal."""
         from legible_envs.overcooked.rendering import draw_ambiguity
 
-        return draw_ambiguity(self.layout, self.ambiguity(), tile=72, title="Where goals are confused")
+        title = "How often a wrong goal is predicted"
+        return draw_ambiguity(self.layout, self.ambiguity(), tile=72, legend=DOUBT, title=title)
 
     def predictors(self) -> list[tuple[str, GoalPredictor]]:
         """The heuristic, and Bayesian goal inference."""
@@ -159,9 +166,9 @@ class KitchenPresenter(Presenter):
     texts = ReportTexts(
         axes={"obstacles": "virtual obstacles", "order": "reading order of the ingredients"},
         archive="with that many virtual obstacles (up) and its ingredients in that reading order (across)",
-        panels="The same room and the same task. A legible kitchen gives the cook's goal away early; its price is the "
-        "distance walked.",
-        best="The best layout of each reading order, for the highest-scoring orders.",
+        panels="The same room and the same task. The darker a floor cell, the more often an observer who sees the cook "
+        "there predicts a wrong goal; cells without colour are on no path. A legible kitchen gives the goal away "
+        "early.",
         distance="expected steps of one task",
         distance_unit="steps",
         distance_digits=1,
@@ -217,8 +224,10 @@ class KitchenPresenter(Presenter):
         return template("kitchen.js")
 
     def icons(self) -> str:
-        """A symbol for every kind of cell."""
-        return template("kitchen_icons.html")
+        """A symbol for every part of a kitchen: the art of the environment's own pictures."""
+        from legible_envs.overcooked.rendering.symbols import kitchen_symbols
+
+        return "\n".join(kitchen_symbols().values())
 
     def place(self, workspace: Any) -> dict[str, Any]:
         """Rows and columns."""
@@ -230,6 +239,39 @@ class KitchenPresenter(Presenter):
 
         return "".join(SYMBOLS[code] for code in layout.cells.ravel())
 
+    def paths(self, workspace: Any, layout: OvercookedLayout) -> list[int | None]:
+        """In how many per cent of visits to each cell an observer would predict a wrong goal; None off all paths."""
+        wrong = workspace.scorer.ambiguity(layout)  # also of kitchens outside the design rules
+        return [None if np.isnan(share) else round(100 * float(share)) for share in wrong.ravel()]
+
+    def panels(self, run: SearchResult) -> Sequence[Panel]:
+        """A middle one of random kitchens (or that the search began with), the shortest one, and the best one."""
+        workspace: Any = run.workspace
+        best = run.require_genome()
+        name = WANTED.get(run.config["objective"]["name"], "best")
+        found = [_first_panel(workspace)]  # drawn anew: a run keeps no random layouts
+        elites = run.elites()
+        if name == "efficient":
+            legible = elites.solution[int(np.argmax(workspace.legibility(elites.solution)))]
+            found.append(panel_of(workspace, "legible", legible, "the most legible layout in the archive"))
+        else:
+            shortest = elites.solution[int(np.argmin(workspace.distance(elites.solution)))]
+            found.append(panel_of(workspace, "shortest", shortest, "the shortest task in the archive"))
+        return [*found, panel_of(workspace, name, best, "the best layout of this search")]
+
+    def about_panels(self, panels: Sequence[Panel]) -> str:
+        """What the colours mean, and what legibility costs in steps."""
+        named = {panel.name: panel for panel in panels}
+        legible = named.get("legible", named.get("legible and efficient"))
+        other = named.get("efficient", named.get("shortest"))
+        if legible is None or other is None:
+            return self.texts.panels
+        unit, digits = self.texts.distance_unit, self.texts.distance_digits
+        price = price_of(legible, other, unit=unit, digits=digits)
+        if "random" in named:
+            price += f" In the random one it takes {named['random'].distance:.{digits}f} {unit}."
+        return f"{self.texts.panels} {price}"
+
     def carried(self, workspace: Any, room: int) -> int:
         """How many drawings fit into that many bytes."""
         height, width = workspace.shape
@@ -239,6 +281,16 @@ class KitchenPresenter(Presenter):
         """What was wanted, and the size of the room."""
         rows, columns = data["place"]["shape"]
         return f"A search for {WANTED.get(data['objective']['name'], 'good')} kitchens, {rows} × {columns}"
+
+
+def _first_panel(workspace: Any) -> Panel:
+    """What the best kitchen is compared with: the one that the search began with, or else a random one."""
+    if workspace.start_from is not None:
+        return panel_of(
+            workspace, "start", workspace.encode(workspace.start_from), "the kitchen that the search began with"
+        )
+    middle = median_of_random(workspace, RANDOM_LAYOUTS, np.random.default_rng(0))
+    return panel_of(workspace, "random", middle, f"the median of {RANDOM_LAYOUTS:,} random layouts by legibility")
 
 
 def panels_text(console: Console, panels: Sequence[Panel]) -> Table:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -23,6 +23,7 @@ from benchmarks.presenters.base import (
     template,
     workspace_of_run,
 )
+from benchmarks.presenters.panels import price_of
 from benchmarks.presenters.registry import load_design, read_source
 from benchmarks.presenters.tabletop_panels import CONDITIONS, LIST, beta_of, listed, panels_of, write_panels
 from legible_envs.errors import LayoutError
@@ -119,9 +120,11 @@ class TableDesign(Design):
         """The table with its shortest reaches, coloured by how unsure an observer is of their goal."""
         from legible_envs.tabletop.rendering import draw_table
 
-        return draw_table(
-            self.layout, task=self.task, width=960, ambiguity=True, beta=beta_of(self.workspace), grown=True
-        )
+        title = "Shortest reaches, by how ambiguous their goal is"
+        if self.layout.obstacles:
+            title += "; pale: the middle of the hand keeps out"
+        beta = beta_of(self.workspace)
+        return draw_table(self.layout, task=self.task, width=960, ambiguity=True, beta=beta, grown=True, title=title)
 
     def write_picture(self, path: Path | None) -> tuple[str, Path] | None:
         """For a run the figure of its panels, into its folder unless told otherwise; else the table."""
@@ -234,9 +237,8 @@ class TablePresenter(Presenter):
             "mean detour": "mean detour",
         },
         archive="at that place of the two measures",
-        panels="The same objects and the same task. Lines are shortest reaches, darker where an observer cannot tell "
-        "the goal yet. The price of a legible table is the length of the path.",
-        best="The best layout of each column of the map, for the highest-scoring ones.",
+        panels="The same objects and the same task. Lines are the shortest reaches: the darker, the less an observer "
+        "who has seen the hand come so far believes in its true goal.",
         distance="expected metres of one task",
         distance_unit="m",
         distance_digits=2,
@@ -354,6 +356,7 @@ class TablePresenter(Presenter):
                 if name in shapes
             },
             "colours": TABLE,
+            "ranked": list(workspace.ranked),
         }
 
     def encode(self, layout: TabletopLayout) -> list[list[int]]:
@@ -379,6 +382,15 @@ class TablePresenter(Presenter):
     def panels(self, run: SearchResult) -> Sequence[Panel]:
         """The baseline and what every condition found."""
         return panels_of(run)
+
+    def about_panels(self, panels: Sequence[Panel]) -> str:
+        """What the colours mean, and what the most legible table costs in metres."""
+        first, best = panels[0], max(panels, key=lambda panel: panel.score)
+        if best is first:
+            return self.texts.panels
+        baseline = replace(first, name=first.name.lower())
+        price = price_of(best, baseline, unit="m", digits=self.texts.distance_digits)
+        return f"{self.texts.panels} {best.name} scores highest. {price}"
 
     def paths(self, workspace: Any, layout: TabletopLayout) -> list[list[list[int]]]:
         """Shortest reaches as ``[x, y, per cent of ambiguity]`` of points along each, in millimetres."""

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterable, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib.resources import files
+from html import unescape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from benchmarks.reports.numbers import with_minus
+from benchmarks.reports.pages import page_environment, table_of
 from legible_envs import __version__
 from legible_envs.support.files import write_text
 
@@ -17,6 +20,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Section", "write_experiment_report", "write_table", "write_tables"]
 
+LONG: Final = 24
+"""Rows from which on a table is folded up."""
 _KINDS: Final = {".png": "image/png", ".svg": "image/svg+xml"}
 
 
@@ -32,37 +37,31 @@ def write_experiment_report(
         lede: A sentence or two below it.
         eyebrow: The kind of page.
     """
-    from jinja2 import Environment
-
-    templates = files("benchmarks") / "templates"
-    page = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True).from_string(
-        (templates / "experiment.html.j2").read_text(encoding="utf-8")
-    )
-    text = page.render(
-        title=title,
-        lede=lede,
-        eyebrow=eyebrow,
-        style=_markup((templates / "report.css").read_text(encoding="utf-8")),
-        sections=[_content(section) for section in sections],
-        footer=f"legible-envs {__version__}. Every table lies beside this page as CSV.",
+    text = (
+        page_environment()
+        .get_template("experiment.html.j2")
+        .render(
+            title=title,
+            lede=lede,
+            eyebrow=eyebrow,
+            sections=[_content(section) for section in sections],
+            footer=f"legible-envs {__version__}. Every table lies beside this page as CSV.",
+        )
     )
     path = folder / "report.html"
     write_text(path, text)
     return path
 
 
-def _markup(text: str) -> Any:
-    from markupsafe import Markup
-
-    return Markup(text)
-
-
 def _content(section: Section) -> dict[str, Any]:
     return {
         "title": section.title,
         "paragraphs": [_with_code(part.strip()) for part in section.text.split("\n\n") if part.strip()],
-        "tables": [_table(caption, table) for caption, table in section.tables.items()],
-        "figures": [(path.stem.replace("_", " "), _data_url(path), _is_wide(path)) for path in section.figures],
+        "tables": [_table(caption, table) for caption, table in section.tables.items() if len(table)],
+        "figures": [
+            (_described(path, section.captions), section.captions.get(path.stem, ""), _data_url(path), _is_wide(path))
+            for path in section.figures
+        ],
     }
 
 
@@ -72,35 +71,28 @@ def _with_code(text: str) -> Any:
 
     parts = text.split("`")
     if len(parts) % 2 == 0:
-        return escape(text)
-    marked = (Markup("<code>{}</code>").format(part) if i % 2 else escape(part) for i, part in enumerate(parts))
+        return escape(with_minus(text))
+    marked = (Markup("<code>{}</code>").format(p) if i % 2 else escape(with_minus(p)) for i, p in enumerate(parts))
     return Markup("").join(marked)
 
 
 def _table(caption: str, table: pd.DataFrame) -> dict[str, Any]:
-    from pandas.api.types import is_bool_dtype, is_numeric_dtype
-
-    numeric = [is_numeric_dtype(table[name]) and not is_bool_dtype(table[name]) for name in table.columns]
-    return {
-        "caption": _with_code(caption),
-        "label": caption.replace("`", ""),
-        "columns": [(str(name).replace("_", " "), kind) for name, kind in zip(table.columns, numeric, strict=True)],
-        "rows": [
-            [(_text(value), kind) for value, kind in zip(row, numeric, strict=True)]
-            for row in table.itertuples(index=False, name=None)
-        ],
-    }
+    """A table under its caption, and whether it is so long that it is folded up."""
+    rows = [dict(zip(table.columns, row, strict=True)) for row in table.itertuples(index=False, name=None)]
+    label = caption.replace("`", "")
+    return {"caption": _with_code(caption), "label": label, "body": table_of([("", rows)]), "is_long": len(rows) > LONG}
 
 
-def _text(value: Any) -> str:
-    """A value for reading: four significant digits, a dash where there is none."""
-    if value is None or value != value:
-        return "–"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, float):
-        return f"{value:,.4g}" if abs(value) < 1e4 else f"{value:,.0f}"
-    return str(value)
+def _described(path: Path, captions: Mapping[str, str]) -> str:
+    """What a figure shows, for those who cannot see it: its caption, or a chart's own title and description."""
+    if path.stem in captions:
+        return captions[path.stem]
+    told = (
+        re.findall(r"<(?:title|desc)>([^<]+)</(?:title|desc)>", path.read_text(encoding="utf-8"))
+        if path.suffix == ".svg"
+        else []
+    )
+    return ". ".join(unescape(words).rstrip(".") for words in told[:2]) or path.stem.replace("_", " ")
 
 
 def _is_wide(path: Path) -> bool:
@@ -134,12 +126,14 @@ class Section:
         text: What its tables and figures say; paragraphs are separated by an empty line.
         tables: By the caption that stands above each.
         figures: Files, ``.svg`` or ``.png``, in the order to be shown.
+        captions: What pictures show, by the names of their files without endings; charts carry their own headings.
     """
 
     title: str
     text: str = ""
     tables: dict[str, pd.DataFrame] = field(default_factory=dict)
     figures: list[Path] = field(default_factory=list)
+    captions: dict[str, str] = field(default_factory=dict)
 
 
 def write_table(path: Path, table: pd.DataFrame) -> Path:

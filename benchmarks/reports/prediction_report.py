@@ -6,11 +6,11 @@ import base64
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from benchmarks.reports.experiment_report import write_tables
+from benchmarks.reports.pages import page_environment, table_of
 from legible_envs.support.files import write_text
 
 if TYPE_CHECKING:
@@ -34,7 +34,12 @@ __all__ = [
 FOLDER: Final = "people"
 """Where in a run's folder ``legible score RUN --predictor`` writes."""
 _FILE: Final = "reading.json"
-_FIGURES: Final = ("accuracy", "learning_curve", "confusion")
+_FIGURES: Final = {
+    "accuracy": "Accuracy against the fraction of a trajectory observed, a line for each predictor",
+    "learning_curve": "Accuracy against the number of trajectories learned from, a line for each predictor",
+    "confusion": "Confusion matrix: true goals as rows, predicted goals as columns",
+}
+"""Figures by name, and what each shows, for readers who cannot see it."""
 _CONFUSION_AT: Final = 0.5
 
 
@@ -288,10 +293,26 @@ def evaluation_section(folder: Path) -> str | None:
         about = json.loads((folder / _FILE).read_text(encoding="utf-8"))
         if about["schema"] != 1:
             return None
-        figures = [(name, _as_image(folder / f"{name}.svg")) for name in _FIGURES if (folder / f"{name}.svg").exists()]
-        return _environment().get_template("people.html.j2").render(about=about, figures=figures)
+        figures = [
+            (name, _FIGURES[name], _as_image(folder / f"{name}.svg"))
+            for name in _FIGURES
+            if (folder / f"{name}.svg").exists()
+        ]
+        template = page_environment().get_template("people.html.j2")
+        return template.render(
+            about=about,
+            figures=figures,
+            summary=table_of([("", about["summary"])], 3),
+            comparisons=[(each, table_of([("", _in_words(each["pairs"]))], 3)) for each in about["comparisons"]],
+        )
     except (OSError, ValueError, KeyError, TypeError):
         return None
+
+
+def _in_words(pairs: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Rows of pairs with columns that say what they hold."""
+    words = {"a": "first", "b": "second", "difference": "first − second", "low": "95 % from", "high": "95 % to"}
+    return [{words.get(key, key): value for key, value in row.items()} for row in pairs]
 
 
 def _as_image(path: Path) -> str:
@@ -301,15 +322,5 @@ def _as_image(path: Path) -> str:
 def _page(folder: Path, title: str) -> str:
     from markupsafe import Markup
 
-    style = (files("benchmarks") / "templates" / "report.css").read_text(encoding="utf-8")
-    section = evaluation_section(folder) or ""
-    template = _environment().get_template("people_page.html.j2")
-    return template.render(title=title, style=Markup(style), section=Markup(section))
-
-
-def _environment() -> Any:
-    from jinja2 import Environment, PackageLoader
-
-    environment = Environment(loader=PackageLoader("benchmarks"), autoescape=True, trim_blocks=True, lstrip_blocks=True)
-    environment.filters["number"] = lambda value: "–" if value is None else f"{value:.3f}".replace("-", "\u2212")
-    return environment
+    section = Markup(evaluation_section(folder) or "")
+    return page_environment().get_template("people_page.html.j2").render(title=title, section=section)

@@ -15,11 +15,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from benchmarks.presenters.base import Panel, Presenter, summary_of, template
-from benchmarks.presenters.losses import explains_stages, loss_row
+from benchmarks.presenters.losses import explains_stages, loss_row, losses_and_gains
 from benchmarks.presenters.registry import presenter_of_run
+from benchmarks.reports.numbers import fixed, significant
+from benchmarks.reports.pages import PageTable, page_environment, table_of
 from benchmarks.reports.prediction_report import FOLDER, evaluation_section
+from benchmarks.reports.variety import pick_varied
+from legible_envs.drawing.palette import HEAT
 from legible_envs.support.files import write_text
 from optimizers import Elites, SearchResult, load_run
 from optimizers.errors import SearchError
@@ -28,12 +33,14 @@ __all__ = ["report_data", "write_best_image", "write_report"]
 
 MAX_LAYOUTS = 1_000
 """At most so many cells, the best ones, carry their layouts."""
-LAYOUT_BYTES = 150_000
+LAYOUT_BYTES = 120_000
 """And at most so many bytes of layouts, so that large kitchens do not outgrow the page."""
 MAX_ROWS, MAX_COLUMNS = 80, 120
 """Finer archives are drawn with several cells in one, each showing the best of them."""
 WORST_ROWS, BEST_ROWS = 10, 3
 """Reaches of the best layout that are listed."""
+VARIED = 8
+"""Good layouts that differ from one another, to be shown."""
 MAX_POINTS = 240
 """Points of a search curve; longer histories are thinned."""
 
@@ -103,15 +110,18 @@ def report_data(
     config, presenter, elites = run.config, presenter_of_run(run), run.elites()
     rows, columns = (int(n) for n in config["archive"]["dims"])
     found = presenter.panels(run) if panels is None else panels
+    cells, genomes = _cells(run, elites, presenter, rows, columns)
+    carried = sum(cell[-1] is not None for cell in cells)
     return {
-        "schema": 3,
+        "schema": 4,
         "workspace": presenter.name,
         "place": presenter.place(run.workspace),
-        "texts": asdict(presenter.texts),
+        "texts": {**asdict(presenter.texts), "panels": presenter.about_panels(found)},
         "objective": dict(config["objective"]),
         "best": _best(run, presenter),
         "axes": _axes(run, elites, rows, columns),
-        "cells": _cells(run, elites, presenter, rows, columns),
+        "cells": cells,
+        "varied": pick_varied(genomes[:carried], VARIED),
         "archive_size": len(elites),
         "archive_dims": [rows, columns],
         "history": _history(run),
@@ -168,19 +178,21 @@ def _cell_labels(low: float, high: float, count: int) -> list[str]:
     return [f"{low + n * width:.{digits}f}" for n in range(count)]
 
 
-def _cells(run: SearchResult, elites: Elites, presenter: Presenter, rows: int, columns: int) -> list[list[Any]]:
-    """The archive as ``[row, column, objective, legibility, distance, layout or None]``, best first."""
+def _cells(
+    run: SearchResult, elites: Elites, presenter: Presenter, rows: int, columns: int
+) -> tuple[list[list[Any]], npt.NDArray[Any]]:
+    """The archive as ``[row, column, objective, legibility, distance, layout or None]``, best first, and genomes."""
     steps = (math.ceil(rows / MAX_ROWS), math.ceil(columns / MAX_COLUMNS))
     drawn: dict[tuple[int, int], int] = {}
     for i, index in enumerate(elites.index):
         row, column = divmod(int(index), columns)
         drawn.setdefault((row // steps[0], column // steps[1]), i)
     if not drawn:
-        return []
+        return [], elites.solution
     genomes = elites.solution[list(drawn.values())]
     legibility, distance = run.workspace.legibility(genomes), run.workspace.distance(genomes)
     carried = min(MAX_LAYOUTS, presenter.carried(run.workspace, LAYOUT_BYTES))
-    return [
+    cells = [
         [
             *cell,
             _plain(elites.objective[i]),
@@ -190,6 +202,7 @@ def _cells(run: SearchResult, elites: Elites, presenter: Presenter, rows: int, c
         ]
         for n, (cell, i) in enumerate(drawn.items())
     ]
+    return cells, genomes
 
 
 def _history(run: SearchResult) -> dict[str, list[float | None]]:
@@ -214,14 +227,18 @@ def _panel(panel: Panel, presenter: Presenter, workspace: Any) -> dict[str, Any]
     }
 
 
-def _explained(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """The rows that lose and win most, for reading."""
-    worst, best = rows[:WORST_ROWS], rows[WORST_ROWS:][-BEST_ROWS:]
-    return [loss_row(row) for row in (*worst, *best)]
+def _explained(rows: Sequence[Mapping[str, Any]]) -> list[tuple[str, list[dict[str, Any]]]]:
+    """The rows that lose and win most, under a heading each; without headings where rows are no stages."""
+    if not explains_stages(rows):
+        shown = (*rows[:WORST_ROWS], *rows[WORST_ROWS:][-BEST_ROWS:])
+        return [("", [loss_row(row) for row in shown])] if shown else []
+    worst, best, title = losses_and_gains(rows, WORST_ROWS, BEST_ROWS)
+    groups = ((title, worst), ("Reaches that win most", best))
+    return [(name, [loss_row(row) for row in part]) for name, part in groups if part]
 
 
 def _plain(value: Any) -> Any:
-    """The same in types that JSON has; numbers to five digits, NaN and infinities as null."""
+    """The same in types that JSON has; numbers to eight digits, so that pages round what is hardly rounded."""
     if isinstance(value, np.ndarray):
         return _plain(value.tolist())
     if isinstance(value, Mapping):
@@ -233,7 +250,7 @@ def _plain(value: Any) -> Any:
     if isinstance(value, int | np.integer):
         return int(value)
     if isinstance(value, float | np.floating):
-        return float(f"{value:.5g}") if math.isfinite(value) else None
+        return float(f"{value:.8g}") if math.isfinite(value) else None
     return value if value is None or isinstance(value, str) else str(value)
 
 
@@ -243,33 +260,40 @@ def _plain(value: Any) -> Any:
 def _render(
     data: dict[str, Any], presenter: Presenter, explanation: Sequence[Mapping[str, Any]], people: str = ""
 ) -> str:
-    from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
-    from legible_envs.overcooked.rendering.palette import PALETTE
-
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters["number"] = _number
-    return environment.from_string(template("report.html.j2")).render(
-        title=presenter.title(data),
-        lede=_lede(data, presenter),
-        figures=_figures(data, presenter),
-        palette=PALETTE,
-        data=data,
-        texts=presenter.texts,
-        workspace=presenter.name,
-        rows=_explained(explanation),
-        stages=explains_stages(explanation),
-        people=Markup(people),
-        best=data["best"],
-        settings=_settings(data["config"]),
-        created=_date(data["config"].get("created")),
-        style=Markup(template("report.css")),
-        icons=Markup(presenter.icons()),
-        drawing=Markup(presenter.script()),
-        script=Markup(template("report.js")),
-        payload=Markup(_json_for_script(data)),
+    return (
+        page_environment()
+        .get_template("report.html.j2")
+        .render(
+            title=presenter.title(data),
+            lede=_lede(data, presenter),
+            figures=_figures(data, presenter),
+            data=data,
+            texts=data["texts"],
+            heat=Markup(json.dumps(HEAT)),
+            workspace=presenter.name,
+            table=table_of(_explained(explanation), 2),
+            people_table=_people_table(data["recorded_play"]),
+            stages=explains_stages(explanation),
+            people=Markup(people),
+            best=data["best"],
+            settings=_settings(data["config"]),
+            created=_date(data["config"].get("created")),
+            icons=Markup(presenter.icons()),
+            drawing=Markup(presenter.script()),
+            script=Markup(template("report.js")),
+            payload=Markup(_json_for_script(data)),
+        )
     )
+
+
+def _people_table(play: Mapping[str, Any] | None) -> PageTable | None:
+    """Accuracy by kitchen, as a table for the page."""
+    if not play or not play["table"]:
+        return None
+    columns, rows = play["table"]["columns"], play["table"]["rows"]
+    return table_of([("", [dict(zip(columns, row, strict=True)) for row in rows])], 3)
 
 
 def _json_for_script(data: dict[str, Any]) -> str:
@@ -284,23 +308,23 @@ def _lede(data: dict[str, Any], presenter: Presenter) -> str:
     texts = presenter.texts
 
     def far(value: Any) -> str:
-        return f"{_number(value, texts.distance_digits)} {texts.distance_unit}".strip()
+        return f"{fixed(value, texts.distance_digits)} {texts.distance_unit}".strip()
 
-    score, length = _number(best.get("score")), far(best.get("distance"))
+    score, length = fixed(best.get("score")), far(best.get("distance"))
     if data["objective"]["name"] == "efficiency":
         text = f"The task of the best {presenter.noun} found takes {length} on average; its legibility is {score}."
     else:
         text = f"The best {presenter.noun} found scores {score} in legibility"
         bounded = data["config"]["workspace"].get("prefix") != "sum"
         if bounded and (best.get("normalised") or -1) > 0:
-            text += f", {_number(100 * best['normalised'], 0)} % of the highest conceivable score"
+            text += f", {fixed(100 * best['normalised'], 0)} % of the highest conceivable score"
         text += f", and its task takes {length} on average."
     if "random" in panels:
         other = panels["random"]
-        text += f" A median random one scores {_number(other['score'])} and takes {far(other['distance'])}."
+        text += f" A median random one scores {fixed(other['score'])} and takes {far(other['distance'])}."
     if "baseline" in panels:
         other = panels["baseline"]
-        text += f" The sorted baseline scores {_number(other['score'])} and takes {far(other['distance'])}."
+        text += f" The sorted baseline scores {fixed(other['score'])} and takes {far(other['distance'])}."
     cap = data["objective"].get("max_distance")
     return text if cap is None else f"{text} Layouts above a distance of {far(cap)} were not allowed."
 
@@ -315,21 +339,21 @@ def _figures(data: dict[str, Any], presenter: Presenter) -> list[tuple[str, str,
     return [
         (
             "Legibility",
-            _number(best.get("score")),
-            f"{_number(single)} of it from single-goal reaches" if "single_goal_score" in best else "",
+            fixed(best.get("score")),
+            f"{fixed(single)} of it from single-goal reaches" if "single_goal_score" in best else "",
         ),
         *(
-            [("Normalised", _number(best["normalised"]), "of at most 1" if bounded else "per reach")]
+            [("Normalised", fixed(best["normalised"]), "of at most 1" if bounded else "per reach")]
             if "normalised" in best
             else []
         ),
-        ("Distance", _number(best.get("distance"), texts.distance_digits), texts.distance),
-        *([("Mean detour", _number(best["mean_detour"]), "of the straight line")] if "mean_detour" in best else []),
-        ("Evaluations", _number(evaluations, 0), f"seed {config.get('seed')}"),
+        ("Distance", fixed(best.get("distance"), texts.distance_digits), texts.distance),
+        *([("Mean detour", fixed(best["mean_detour"]), "times the straight line")] if "mean_detour" in best else []),
+        ("Evaluations", fixed(evaluations, 0), f"seed {config.get('seed')}"),
         (
             "Archive",
-            f"{_number(filled, 0)} layouts",
-            f"{_number(100 * filled / cells, 0)} % of {_number(cells, 0)} cells",
+            f"{fixed(filled, 0)} layouts",
+            f"{fixed(100 * filled / cells, 0)} % of {fixed(cells, 0)} cells",
         ),
     ]
 
@@ -364,7 +388,9 @@ def _words(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):
-        return f"{value:.6g}"
+        return significant(value, 6)
+    if isinstance(value, int):
+        return fixed(value, 0)
     return "" if value is None else str(value)
 
 
@@ -375,10 +401,3 @@ def _date(text: Any) -> str:
         return ""
     zone = f" {moment.tzname()}" if moment.tzname() else ""
     return f"{moment.day} {moment:%B %Y, %H:%M}{zone}"
-
-
-def _number(value: Any, digits: int = 2) -> str:
-    """A number for reading: thousands apart, a true minus sign, a dash where there is none."""
-    if value is None:
-        return "–"
-    return f"{value:,.{digits}f}".replace("-", "\u2212").replace(",", "\u202f")

@@ -37,7 +37,27 @@
   // Lightness rises evenly, so equal steps of the score look equal, and the order survives without colour vision.
   const ramp = (t) => `oklch(${(0.3 + 0.62 * t).toFixed(3)} ${(0.1 + 0.05 * Math.sin(Math.PI * t)).toFixed(3)} ${(285 - 185 * t).toFixed(1)})`;
 
-  const place = makePlace(data, { svg, el, number, plural });
+  // The scale of doubt, as in pictures: between two neighbouring colours in proportion.
+  function heat(share) {
+    const at = Math.min(Math.max(share, 0), 1) * (HEAT.length - 1), below = Math.min(Math.floor(at), HEAT.length - 2);
+    const parts = (colour) => [1, 3, 5].map((i) => parseInt(colour.slice(i, i + 2), 16));
+    const [from, to] = [parts(HEAT[below]), parts(HEAT[below + 1])];
+    return `rgb(${from.map((v, i) => Math.round(v + (to[i] - v) * (at - below))).join(" ")})`;
+  }
+  const place = makePlace(data, { svg, el, number, plural, heat });
+  function scaleOf(low, stops, high) {
+    const bar = el("span", { class: "ramp" });
+    bar.style.background = `linear-gradient(90deg, ${stops.join(", ")})`;
+    return el("span", { class: "scale" }, el("span", {}, low), bar, el("span", {}, high));
+  }
+  const key = (mark, ...words) => el("span", { class: "key" }, mark, ...words);
+  function star(size) {
+    const points = Array.from({ length: 10 }, (_, i) => {
+      const radius = size / 2 * (i % 2 ? 0.42 : 1), angle = Math.PI * (i / 5 - 0.5);
+      return `${(radius * Math.cos(angle)).toFixed(2)},${(radius * Math.sin(angle)).toFixed(2)}`;
+    });
+    return svg("polygon", { class: "best-mark", points: points.join(" ") });
+  }
 
   // -- the archive -----------------------------------------------------------------------------------------------------
 
@@ -98,8 +118,9 @@
     beside.textContent = axisName(rowAxis.name) + " →";
     picture.append(under, beside);
     if (cells.length) {
-      const best = { x: cellX(cells[0].column), y: cellY(cells[0].row) };
-      picture.append(svg("rect", { class: "best-mark", x: best.x - 1, y: best.y - 1, width: cellWidth + 2, height: cellHeight + 2, rx: 3 }));
+      const best = star(Math.max(11 * scale, Math.min(0.72 * Math.min(cellWidth, cellHeight), 18)));
+      best.setAttribute("transform", `translate(${cellX(cells[0].column) + cellWidth / 2} ${cellY(cells[0].row) + cellHeight / 2})`);
+      picture.append(best);
     }
     cursor = svg("g", { visibility: "hidden" }, ...["halo", "cursor"].map((name) => svg("rect", { class: name, width: cellWidth + 4, height: cellHeight + 4, rx: 4 })));
     picture.append(cursor);
@@ -108,17 +129,24 @@
   }
   function drawLegend() {
     if (!cells.length) { $("legend").textContent = "The archive is empty."; return; }
-    const stops = Array.from({ length: 17 }, (_, i) => ramp(i / 16)).join(", ");
-    const bar = el("span", { class: "ramp" });
-    bar.style.background = `linear-gradient(90deg, ${stops})`;
+    const stops = Array.from({ length: 17 }, (_, i) => ramp(i / 16));
     const names = { "legibility": hasCosts ? "legibility net of costs" : "legibility", "efficiency": "efficiency (distance, negated)" };
-    const key = (kind, text) => el("span", { class: "key" }, el("span", { class: kind }), text);
-    const parts = [el("span", {}, names[data.objective.name] || data.objective.name), el("span", {}, (low < floorValue ? "≤ " : "") + number(floorValue)), bar, el("span", {}, number(high)), key("swatch ring", "best")];
-    if (cells.length < rowAxis.count * columnAxis.count) parts.push(key("swatch", "none found"));
+    const parts = [el("span", {}, names[data.objective.name] || data.objective.name), scaleOf((low < floorValue ? "≤ " : "") + number(floorValue), stops, number(high)),
+      key(svg("svg", { viewBox: "-9 -9 18 18", class: "sample", "aria-hidden": "true" }, star(16)), "the best"), key(el("span", { class: "swatch chosen" }), "the one shown")];
+    if (cells.length < rowAxis.count * columnAxis.count) parts.push(key(el("span", { class: "swatch" }), "none found"));
     if (rowAxis.step * columnAxis.step > 1) parts.push(el("span", {}, `each square: the best of ${rowAxis.step * columnAxis.step} cells`));
     const rows = rowAxis.labels.length * rowAxis.step;
     if (rows < rowAxis.whole) parts.push(el("span", {}, `rows ${rows} to ${rowAxis.whole - 1} are empty and left out`));
     $("legend").append(...parts);
+    if (!place.codes?.length) return;
+    if (place.codesAbout) $("codes").append(el("span", {}, place.codesAbout));
+    for (const [code, word, mark] of place.codes) $("codes").append(key(mark || "", el("b", { class: "code" }, code), word));
+  }
+  function drawDoubt() {
+    if (!place.doubt || !data.panels.some((panel) => panel.paths.length)) return;
+    const stops = Array.from({ length: 11 }, (_, i) => heat(i / 10));
+    $("doubt").append(el("span", {}, place.doubt.title), scaleOf(place.doubt.low, stops, place.doubt.high));
+    for (const [mark, words] of place.marks || []) $("doubt").append(key(mark, words));
   }
   function pairs(items) {
     const list = el("dl", { class: "pairs" });
@@ -135,7 +163,7 @@
     $("board").replaceChildren(cell.layout ? place.board(cell.layout) : el("div", { class: "missing" }, "The page carries the drawings of the best cells only; this layout lies in archive.npz."));
     const obstacles = cell.layout && place.obstacles ? place.obstacles(cell.layout) : data.axes[0].name === "obstacles" ? rowAxis.labels[cell.row] : "–";
     const order = place.inWords(columnAxis.labels[cell.column]);
-    const facts = [["Legibility", number(cell.legibility)], ["Distance", number(cell.distance, data.texts.distance_digits)]];
+    const facts = [["Legibility", number(cell.legibility)], ["Distance", `${number(cell.distance, data.texts.distance_digits)} ${data.texts.distance_unit}`.trim()]];
     if (place.obstacles) facts.push(["Obstacles", String(obstacles)]);
     if (!["legibility", "efficiency"].includes(data.objective.name)) facts.unshift([data.objective.name, number(cell.objective)]);
     else if (hasCosts && data.objective.name === "legibility") facts.push(["Net of costs", number(cell.objective)]);
@@ -212,13 +240,15 @@
 
   // -- panels side by side ---------------------------------------------------------------------------------------------
 
-  function bar(name, value, [from, to], digits) {
+  // A bar from the line at its zero (of detours: at 1, the straight line) to the value.
+  function bar(name, value, [from, to], digits, unit = "", zero = 0) {
     const position = (v) => Math.max(0, Math.min(100, (v - from) / (to - from || 1) * 100));
-    const [a, b] = [position(Math.min(0, value)), position(Math.max(0, value))];
-    const fill = el("span", { class: "fill" });
+    const [a, b] = [position(Math.min(zero, value)), position(Math.max(zero, value))];
+    const fill = el("span", { class: value < zero ? "fill below" : "fill" }), line = el("span", { class: "zero" });
     fill.style.left = a + "%";
     fill.style.width = Math.max(b - a, 0.8) + "%";
-    return el("div", { class: `bar ${name}` }, el("span", {}, name[0].toUpperCase() + name.slice(1)), el("span", { class: "track" }, fill), el("span", {}, number(value, digits)));
+    line.style.left = position(zero) + "%";
+    return el("div", { class: `bar ${name}` }, el("span", {}, name[0].toUpperCase() + name.slice(1)), el("span", { class: "track", "aria-hidden": "true" }, fill, line), el("span", { class: "value" }, number(value, digits) + (unit ? "\u202f" + unit : "")));
   }
   function drawPanels() {
     const range = (key) => [Math.min(0, ...data.panels.map((c) => c[key])), Math.max(0, ...data.panels.map((c) => c[key]))];
@@ -226,17 +256,15 @@
     for (const panel of data.panels) {
       $("panels").append(el("figure", {}, place.board(panel.layout, panel.paths),
         el("figcaption", {}, el("div", { class: "name" }, panel.name[0].toUpperCase() + panel.name.slice(1)), el("p", { class: "note" }, panel.note),
-          bar("legibility", panel.score, scores, 2), bar("distance", panel.distance, distances, data.texts.distance_digits), panel.detour === null ? null : bar("detour", panel.detour, [1, Math.max(...data.panels.map((c) => c.detour), 1.2)], 2))));
+          el("div", { class: "bars" }, bar("legibility", panel.score, scores, 2), bar("distance", panel.distance, distances, data.texts.distance_digits, data.texts.distance_unit), panel.detour === null ? null : bar("detour", panel.detour, [1, Math.max(...data.panels.map((c) => c.detour), 1.2)], 2, "×", 1)))));
     }
+    drawDoubt();
   }
   function drawBest() {
-    const seen = new Set();
-    for (const cell of cells) {
-      if (!cell.layout || seen.has(cell.column) || seen.size === 12) continue;
-      seen.add(cell.column);
+    for (const cell of data.varied.map((rank) => cells[rank])) {
       const card = el("button", { type: "button", class: "card", "aria-label": `Show the layout of rank ${cell.rank + 1} on the map` }, place.board(cell.layout));
       card.addEventListener("click", () => { pin(cell); $("map").focus({ preventScroll: true }); $("h-archive").scrollIntoView({ behavior: matchMedia("(prefers-reduced-motion: reduce)").matches ? "auto" : "smooth" }); });
-      $("best").append(el("figure", {}, card, el("figcaption", {}, el("div", { class: "name" }, number(cell.objective)), el("p", { class: "note" }, `${columnAxis.labels[cell.column]}${place.obstacles ? " · " + plural(place.obstacles(cell.layout), "obstacle") : ""} · distance ${number(cell.distance, data.texts.distance_digits)}`))));
+      $("best").append(el("figure", {}, card, el("figcaption", {}, el("div", { class: "name" }, number(cell.objective)), el("p", { class: "note" }, `rank ${number(cell.rank + 1, 0)} · ${place.obstacles ? plural(place.obstacles(cell.layout), "obstacle") + " · " : ""}${number(cell.distance, data.texts.distance_digits)} ${data.texts.distance_unit}`))));
     }
   }
 
@@ -249,21 +277,32 @@
     for (let v = Math.ceil(from / step - 1e-9) * step; v <= to + step * 1e-6; v += step) list.push(Math.abs(v) < step * 1e-6 ? 0 : v);
     return list;
   }
-  const compact = (v) => Math.abs(v) >= 1e6 ? number(v / 1e6, v % 1e6 ? 1 : 0) + " M" : Math.abs(v) >= 1e4 ? number(v / 1e3, v % 1e3 ? 1 : 0) + " k" : number(v, v % 1 ? (Math.abs(v) < 1 ? 2 : 1) : 0);
+  const across = (canvas, frame, words) => {
+    const text = svg("text", { x: frame.left + (frame.width - frame.left) / 2, y: frame.height - 4, "text-anchor": "middle" });
+    text.textContent = words;
+    canvas.append(text);
+  };
+  // As many decimals as the steps between ticks need, so that equal steps look equal.
+  function decimals(list) {
+    const step = list.length > 1 ? list[1] - list[0] : 1;
+    return [0, 1, 2, 3].find((digits) => Math.abs(step * 10 ** digits - Math.round(step * 10 ** digits)) < 1e-6) ?? 4;
+  }
+  const compact = (v, digits = v % 1 ? (Math.abs(v) < 1 ? 2 : 1) : 0) => Math.abs(v) >= 1e6 ? number(v / 1e6, v % 1e6 ? 1 : 0) + " M" : Math.abs(v) >= 1e4 ? number(v / 1e3, v % 1e3 ? 1 : 0) + " k" : number(v, digits);
   function axes(frame, xs, [bottom, top], { format = compact, formatX = compact, label = "" }) {
     const { width, height, left, under: below } = frame;
     const x = (v) => left + (v - xs[0]) / (xs[xs.length - 1] - xs[0] || 1) * (width - left - 8);
     const y = (v) => height - below - (v - bottom) / (top - bottom || 1) * (height - below - 8);
     const canvas = svg("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": label });
-    for (const v of ticks(bottom, top)) {
+    const up = ticks(bottom, top), along = ticks(xs[0], xs[xs.length - 1]);
+    for (const v of up) {
       canvas.append(svg("line", { class: "grid", x1: left, x2: width - 8, y1: y(v), y2: y(v) }));
       const text = svg("text", { x: left - 6, y: y(v) + 4, "text-anchor": "end" });
-      text.textContent = format(v);
+      text.textContent = format(v, decimals(up));
       canvas.append(text);
     }
-    for (const v of ticks(xs[0], xs[xs.length - 1])) {
-      const text = svg("text", { x: x(v), y: height - below + 18, "text-anchor": "middle" });
-      text.textContent = formatX(v);
+    for (const v of along) {
+      const text = svg("text", { x: Math.min(x(v), width - 14), y: height - below + 18, "text-anchor": "middle" });
+      text.textContent = formatX(v, decimals(along));
       canvas.append(text);
     }
     return { canvas, x, y };
@@ -280,8 +319,9 @@
       let [bottom, top] = [Math.min(...ys), Math.max(...ys)];
       if (key === "coverage" || (bottom > 0 && bottom < top * 0.6)) bottom = 0;
       if (top === bottom) top = bottom + 1;
-      const frame = { width: 380, height: 220, left: 48, under: 30 };
+      const frame = { width: 380, height: 236, left: 48, under: 46 };
       const { canvas, x, y } = axes(frame, domain, [bottom, top], { format: key === "coverage" ? (v) => number(v * 100, 0) + " %" : compact, label: `${title} against evaluations: ends at ${format(ys[ys.length - 1])}` });
+      across(canvas, frame, "layouts scored →");
       const path = points.map(([px, py], i) => `${i ? "L" : "M"}${x(px).toFixed(1)} ${y(py).toFixed(1)}`).join("");
       canvas.append(svg("path", { class: "area", d: `${path}L${x(points[points.length - 1][0])} ${frame.height - frame.under}L${x(points[0][0])} ${frame.height - frame.under}Z` }), svg("path", { class: "line", d: path }));
       if (points.length === 1) canvas.append(svg("circle", { class: "dot", r: 4.5, cx: x(points[0][0]), cy: y(points[0][1]) }));
@@ -315,8 +355,8 @@
     const all = curves.flatMap((curve) => curve.values).filter((v) => v !== null);
     const percent = (v) => number(v * 100, 0) + " %";
     const { canvas, x, y } = axes(frame, fractions, [Math.floor(Math.min(...all, 1) * 10) / 10, Math.ceil(Math.max(...all, 0) * 10) / 10], { format: percent, formatX: percent, label: curves.map((curve) => `${curve.label}: ${curve.values.map((v) => number(v, 2)).join(", ")}`).join(". ") });
-    const colours = ["var(--warm)", "var(--accent)", "var(--k-fish)", "var(--k-leaf)", "var(--soft)"];
-    const legend = el("p", { class: "about" });
+    const colours = ["var(--warm)", "var(--accent)", "var(--third)", "var(--fourth)", "var(--soft)"];
+    const legend = el("div", { class: "legend" });
     curves.forEach((curve, i) => {
       const colour = colours[i % colours.length], dash = i % 2 ? "none" : "6 4";
       const points = curve.values.map((v, n) => [fractions[n], v]).filter(([, v]) => v !== null);
@@ -330,13 +370,12 @@
         dot.style.fill = colour;
         canvas.append(dot);
       }
-      const key = el("span", {}, "● ");
-      key.style.color = colour;
-      legend.append(key, curve.label, i < curves.length - 1 ? "\u2003" : "");
+      const mark = svg("svg", { viewBox: "0 0 30 12", class: "stroke", "aria-hidden": "true" }, svg("path", { class: "line", d: "M1 6H29" }), svg("circle", { class: "dot", r: 4, cx: 15, cy: 6 }));
+      mark.style.setProperty("--colour", colour);
+      mark.firstChild.style.strokeDasharray = dash;
+      legend.append(key(mark, curve.label));
     });
-    const caption = svg("text", { x: frame.left + (frame.width - frame.left) / 2, y: frame.height - 6, "text-anchor": "middle" });
-    caption.textContent = "share of the trajectory observed →";
-    canvas.append(caption);
+    across(canvas, frame, "share of the trajectory observed →");
     $("people").append(el("h3", {}, "Goals predicted correctly"), canvas, legend);
   }
 

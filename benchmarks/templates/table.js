@@ -1,15 +1,10 @@
 "use strict";
 // Draws tables: a layout is a list of [x, y] of every object, then [x, y, angle] of every obstacle, in tenths of a
 // millimetre and hundredths of a degree, y away from the person.
-function makePlace(data, { svg, number, plural }) {
+function makePlace(data, { svg, number, plural, heat }) {
   const { size: [width, depth], region, assembly, starts, hand, obstacle, objects, glyphs, colours } = data.place;
   const split = (layout) => [layout.slice(0, objects.length), layout.slice(objects.length)];
   const up = (y) => depth - y;
-  const heat = ["#fff4c2", "#fdd27a", "#f79d55", "#e2604f", "#b02e62", "#6b1d66"];
-  const shade = (share) => {
-    const at = Math.min(share, 0.999) * (heat.length - 1), below = Math.floor(at);
-    return `color-mix(in oklab, ${heat[below + 1]} ${((at - below) * 100).toFixed(0)}%, ${heat[below]})`;
-  };
   const names = (layout) => split(layout)[0].map(([x, y], i) => `${objects[i].name} at ${number(x / 1e4)}, ${number(y / 1e4)} m`);
 
   function box([x0, y0, x1, y1], fill, line) {
@@ -44,7 +39,7 @@ function makePlace(data, { svg, number, plural }) {
     group.append(svg("polyline", { points: points.map(([x, y]) => `${x},${up(y)}`).join(" "), stroke: colours.rim, "stroke-width": 11 }));
     points.slice(1).forEach(([x, y], i) => {
       const [fromX, fromY, ambiguity] = points[i];
-      group.append(svg("line", { x1: fromX, y1: up(fromY), x2: x, y2: up(y), style: `stroke: ${shade(ambiguity / 100)}; stroke-width: 7.5px` }));
+      group.append(svg("line", { x1: fromX, y1: up(fromY), x2: x, y2: up(y), style: `stroke: ${heat(ambiguity / 100)}; stroke-width: 7.5px` }));
     });
     return group;
   }
@@ -60,8 +55,10 @@ function makePlace(data, { svg, number, plural }) {
     }
     for (const [x, y, angle] of walls) {
       const [long, wide] = obstacle;
-      // Edges lie outside: on a small board they would leave nothing of the cyan.
-      picture.append(svg("rect", { x: -long / 2 - 1.2, y: -wide / 2 - 1.2, width: long + 2.4, height: wide + 2.4, fill: colours.obstacle, stroke: colours.obstacle_edge, "stroke-width": 2.4, transform: `translate(${x / 10} ${up(y / 10)}) rotate(${-angle / 100})` }));
+      // Edges lie outside: on a small board they would leave nothing of the cyan, and style sheets widen both.
+      const at = { transform: `translate(${x / 10} ${up(y / 10)}) rotate(${-angle / 100})` };
+      picture.append(svg("g", at, ...[["edge", 2.4, colours.obstacle_edge], ["light", 0, colours.obstacle]].map(([name, grown, fill]) =>
+        svg("rect", { class: `obstacle ${name}`, x: -long / 2 - grown, y: -wide / 2 - grown, width: long + 2 * grown, height: wide + 2 * grown, fill, stroke: fill }))));
     }
     // Ambiguity on top: the clearest reaches first.
     const total = (points) => points.reduce((sum, point) => sum + point[2], 0);
@@ -80,8 +77,27 @@ function makePlace(data, { svg, number, plural }) {
     }, null, 1);
   }
   const obstacles = (layout) => layout.length - objects.length;
-  const initials = new Map(objects.map((object) => [object.name.split("-").map((part) => part[0]).join(""), object.name]));
+  const inInitials = (name) => name.split("-").map((part) => part[0]).join("");
+  const initials = new Map(objects.map((object) => [inInitials(object.name), object.name]));
+  function sample(...parts) {
+    return svg("svg", { viewBox: "-30 -30 60 60", class: "sample", "aria-hidden": "true" }, ...parts);
+  }
+  function boxSample(object) {
+    const [long, wide] = object.size, side = Math.max(long, wide);
+    return sample(svg("g", { transform: `scale(${56 / side}) translate(0 ${-depth})` }, boxOf({ ...object, angle: 0 }, 0, 0)));
+  }
+  const used = new Set(data.axes[1].labels.flatMap((label) => String(label).split(" ")));
+  const coded = objects.filter((object) => used.has(inInitials(object.name)));
+  const codes = coded.length < 2 ? undefined : coded.map((object) => [inInitials(object.name), object.name, boxSample(object)]);
+  const codesAbout = "Initials of the objects, from left to right:";
+  const bare = { "stroke-width": 5 };
+  const marks = [
+    [sample(svg("circle", { r: 22, fill: "none", stroke: colours.start, ...bare }), svg("circle", { r: 5, fill: colours.start })), "where the hand starts a reach"],
+    ...(data.panels.some((panel) => panel.layout.length > objects.length) ? [[sample(svg("g", { transform: "rotate(-20)" }, svg("rect", { x: -29, y: -8, width: 58, height: 16, fill: colours.obstacle, stroke: colours.obstacle_edge, "stroke-width": 4 }))), "virtual obstacle, which the hand goes round"]] : []),
+    ...(objects.some((object) => object.slot) ? [[sample(svg("rect", { x: -22, y: -22, width: 44, height: 44, rx: 6, fill: colours.slot, stroke: colours.slot_line, "stroke-width": 4 })), "where an object belongs"]] : []),
+  ];
+  const doubt = { title: "How far an observer doubts the true goal: 1 less its probability (Eq. 1)", low: "0", high: "1" };
   const inWords = (label) => String(label).split(" ").map((part) => initials.get(part) || part).join(" · ");
 
-  return { board, asText, obstacles, inWords };
+  return { board, asText, obstacles, inWords, codes, codesAbout, marks, doubt };
 }

@@ -170,7 +170,9 @@ def leaderboard(best: pd.DataFrame) -> pd.DataFrame:
 def gaps(ends: pd.DataFrame) -> pd.DataFrame:
     """How far each method stays below the proven optimum of 5x5, and how often it reaches it."""
     own = ends[ends["grid"] == "5x5"]
-    own = own.assign(gap=OPTIMUM_5X5 - own["best"], reached=OPTIMUM_5X5 - own["best"] <= _REACHED)
+    gap = OPTIMUM_5X5 - own["best"]
+    reached = gap <= _REACHED
+    own = own.assign(gap=gap.mask(reached, 0.0), reached=reached)  # what is left is rounding
     grouped = own.groupby(["budget", "method"], sort=False)
     return grouped.agg(
         searches=("gap", "size"), gap=("gap", "mean"), largest_gap=("gap", "max"), reached=("reached", "mean")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from benchmarks.experiments.conditions import stacked
 from benchmarks.experiments.overcooked import figures, narrative, tables
@@ -15,6 +15,14 @@ if TYPE_CHECKING:
     import pandas as pd
 
 __all__ = ["sections"]
+
+_CAPTIONS: Final = {
+    "layouts": "The best kitchen of each condition, and a middle one of the random ones. The darker a floor cell, the "
+    "more often an observer who sees the person there predicts a wrong goal; cells without colour are on no path.",
+    "rewards": "What stepping on each cell is worth to the participants, as inverse reinforcement learning infers it "
+    "from their trajectories: the darker, the more. The same kitchens.",
+}
+"""What the pictures show."""
 
 
 def sections(folder: str | Path) -> list[Section]:
@@ -51,7 +59,9 @@ def sections(folder: str | Path) -> list[Section]:
     write_tables(folder / "tables", written.items())
     drawn = figures.draw_all(results, folder / "figures")
     return [
-        Section("Layouts", narrative.about_layouts(layouts), {"Layouts by condition": layouts}, drawn["layouts"]),
+        Section(
+            "Layouts", narrative.about_layouts(layouts), {"Layouts by condition": layouts}, drawn["layouts"], _CAPTIONS
+        ),
         Section("Participants", narrative.about_participants(results), {"Fitted to recorded play": fitted}),
         Section(
             "How well goals are predicted",
@@ -76,6 +86,7 @@ def sections(folder: str | Path) -> list[Section]:
             narrate("overcooked/confusion", walker=results.walkers[0]),
             {},
             drawn["confusion"],
+            _CAPTIONS,
         ),
     ]
 

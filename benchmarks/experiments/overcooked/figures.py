@@ -12,6 +12,7 @@ from benchmarks.experiments.conditions import slug
 from benchmarks.experiments.figures import bars_by_condition, save_accuracy, save_learning
 from benchmarks.experiments.overcooked import tables
 from benchmarks.experiments.overcooked.sweep import CONDITIONS
+from benchmarks.presenters.overcooked import DOUBT
 from legible_envs.drawing.chart_parts import number_squares
 from legible_envs.drawing.charts import SOFT, Chart, ChartSize, save_figure, styled
 from predictors.evaluation.figures import confusion_figure
@@ -129,12 +130,13 @@ def boards(best: pd.DataFrame) -> Any:
 
     kitchens = [OvercookedLayout.from_ascii(drawing) for drawing in best["drawing"]]
     return draw_side_by_side(
-        [draw_ambiguity(kitchen, ambiguity(kitchen), tile=TILE) for kitchen in kitchens],
+        [draw_ambiguity(kitchen, ambiguity(kitchen), tile=TILE, legend=DOUBT) for kitchen in kitchens],
         list(best["condition"]),
         [
-            f"legibility {score:.1f}\ndistance {distance:.0f} steps"
+            f"legibility {score:.1f}\ndistance {distance:.0f} steps".replace("-", "\u2212")
             for score, distance in zip(best["score"], best["distance"], strict=True)
         ],
+        columns=2,
     )
 
 
@@ -153,7 +155,7 @@ def rewards(best: pd.DataFrame, costs: pd.DataFrame) -> Any:
         heat = (reward - low) / (high - low) if high - low > 1e-12 else np.where(np.isnan(reward), np.nan, 0.5)
         ends = f"reward {low:.2f}".replace("-", "\u2212"), f"{high:.2f}".replace("-", "\u2212")
         pictures.append(draw_ambiguity(kitchen, np.clip(heat, 0, 1), tile=TILE, legend=ends))
-    return draw_side_by_side(pictures, list(best["condition"]), None)
+    return draw_side_by_side(pictures, list(best["condition"]), None, columns=2)
 
 
 # -- all of them ------------------------------------------------------------------------------------------------------

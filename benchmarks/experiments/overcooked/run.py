@@ -20,8 +20,9 @@ from benchmarks.experiments.overcooked.sweep import (
     people_of,
 )
 from benchmarks.experiments.predictor_settings import predictor_from
-from benchmarks.experiments.running import Rows, RunOptions, log_trials, median_of_random, with_layouts
+from benchmarks.experiments.running import Rows, RunOptions, log_trials, with_layouts
 from benchmarks.experiments.trial_rows import accuracy_rows, curve_rows
+from benchmarks.presenters.panels import median_of_random
 from benchmarks.trials import TrialName, trial_function
 
 if TYPE_CHECKING:

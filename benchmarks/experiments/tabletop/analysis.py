@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from benchmarks.experiments.conditions import stacked, variance_rows
 from benchmarks.experiments.tabletop import figures, narrative, tables
@@ -16,6 +16,14 @@ if TYPE_CHECKING:
     from benchmarks.experiments.hypotheses import Hypotheses
 
 __all__ = ["sections"]
+
+_CAPTIONS: Final = {
+    "layouts": "The best table of each condition, and what is built. Ribbons are the shortest reaches: the darker, the "
+    "less an observer who has seen the hand come so far believes in its true goal.",
+    "reaches": "Reaches from the assembly zone to every object: their mean as a line, and ellipses of two standard "
+    "deviations, on the same tables; a colour for each object.",
+}
+"""What the pictures show."""
 
 
 def sections(folder: str | Path) -> list[Section]:
@@ -82,7 +90,11 @@ def _accuracy_sections(
 ) -> list[Section]:
     return [
         Section(
-            "Tables", narrative.about_layouts(results), {"Tables by condition": found["layouts"]}, drawn["layouts"]
+            "Tables",
+            narrative.about_layouts(results),
+            {"Tables by condition": found["layouts"]},
+            drawn["layouts"],
+            _CAPTIONS,
         ),
         Section("Participants", narrative.about_participants()),
         Section(
@@ -105,10 +117,11 @@ def _accuracy_sections(
             "How much reaches differ",
             narrative.about_spread(found["spread"], found["published_spread"]),
             {
-                "Determinant (m^4) and trace (m^2) beside the paper": found["published_spread"],
+                "Determinant (m⁴) and trace (m²) beside the paper": found["published_spread"],
                 "By alignment": found["spread"],
             },
             drawn["spread"],
+            _CAPTIONS,
         ),
     ]
 

@@ -43,7 +43,7 @@ def boards(best: pd.DataFrame) -> Any:
 
     layouts = {row["condition"]: TabletopLayout.from_json(row["json"]) for row in best.to_dict("records")}
     return draw_panels(
-        {str(name): layout for name, layout in layouts.items()}, read_task("columns"), width=480, columns=4
+        {str(name): layout for name, layout in layouts.items()}, read_task("columns"), width=480, columns=2
     )
 
 
@@ -60,7 +60,7 @@ def spreads_over_tables(best: pd.DataFrame, spreads: pd.DataFrame, width: int = 
         layout = TabletopLayout.from_json(row["json"])
         images.append(_draw_spread(layout, read_task("columns"), own, width))
         captions.append(f"trace {own['trace'].mean():.2e} m^2\ndeterminant {own['determinant'].mean():.2e} m^4")
-    return draw_side_by_side(images, list(best["condition"]), captions, columns=3, text=max(13, round(width * 0.047)))
+    return draw_side_by_side(images, list(best["condition"]), captions, columns=2, text=max(13, round(width * 0.047)))
 
 
 def _draw_spread(layout: TabletopLayout, task: TabletopTask, own: pd.DataFrame, width: int) -> npt.NDArray[np.uint8]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 
 from benchmarks.experiments.predictor_settings import predictor_from
-from benchmarks.experiments.running import Rows, RunOptions, log_trials, median_of_random, with_layouts
+from benchmarks.experiments.running import Rows, RunOptions, log_trials, with_layouts
 from benchmarks.experiments.tabletop.sweep import (
     DESIGNS,
     FULL,
@@ -23,6 +23,7 @@ from benchmarks.experiments.tabletop.sweep import (
     team_trials,
 )
 from benchmarks.experiments.trial_rows import accuracy_rows, curve_rows
+from benchmarks.presenters.panels import median_of_random
 from benchmarks.trials import TrialName, trial_function
 
 if TYPE_CHECKING:

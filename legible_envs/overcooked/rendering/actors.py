@@ -7,13 +7,14 @@ from functools import lru_cache
 from typing import Final
 
 from legible_envs.drawing.canvas import Canvas, Sprite, mix
+from legible_envs.drawing.svg_canvas import Pen
 from legible_envs.overcooked.game.view import Item, PotView
 from legible_envs.overcooked.grid import EAST, NORTH, SOUTH, WEST
 from legible_envs.overcooked.rendering.food import draw_item, draw_pieces, soup_colour
 from legible_envs.overcooked.rendering.palette import PALETTE, PLAYER_COLOURS
 from legible_envs.overcooked.rendering.tiles import COUNTER_TOP
 
-__all__ = ["CHEF_RISE", "chef_sprite", "draw_tick", "pot_sprite"]
+__all__ = ["CHEF_RISE", "chef_sprite", "draw_pot", "draw_tick", "pot_sprite"]
 
 CHEF_RISE: Final = 0.3
 """How far a chef's hat rises above the cell stood on, in tiles."""
@@ -163,7 +164,8 @@ def _steam(canvas: Canvas, phase: int) -> None:
         canvas.stroke(line, 0.045, PALETTE["steam"], 0.75)
 
 
-def _pot(canvas: Canvas, pot: PotView) -> None:
+def draw_pot(canvas: Pen, pot: PotView) -> None:
+    """A pot with what is in it, without flames, steam and gauge, on a tile."""
     iron, y = PALETTE["pot"], COUNTER_TOP
     for side in (-1, 1):
         canvas.rectangle(0.5 + side * 0.345 - 0.055, y - 0.05, 0.11, 0.1, mix(iron, "#20252c", 0.25), radius=0.04)
@@ -209,7 +211,7 @@ def _cached_pot(pot: PotView, step: int, size: int) -> Sprite:
     elif pot.is_cooking:
         canvas.circle(0.5, COUNTER_TOP, 0.37, PALETTE["flame"], 0.35)
         _flames(canvas, pot.ticks)
-    _pot(canvas, pot)
+    draw_pot(canvas, pot)
     if pot.is_ready:
         _steam(canvas, 0)
         _gauge(canvas, 1.0, PALETTE["ready"])

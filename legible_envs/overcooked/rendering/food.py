@@ -8,6 +8,7 @@ from functools import lru_cache
 from typing import Final
 
 from legible_envs.drawing.canvas import Canvas, Sprite, mix
+from legible_envs.drawing.svg_canvas import Pen
 from legible_envs.overcooked.game.view import Item
 from legible_envs.overcooked.layout import INGREDIENTS
 from legible_envs.overcooked.rendering.palette import PALETTE
@@ -15,7 +16,7 @@ from legible_envs.overcooked.rendering.palette import PALETTE
 __all__ = ["draw_ingredient", "draw_item", "draw_pieces", "draw_plate", "item_sprite", "soup_colour"]
 
 
-def _tomato(canvas: Canvas, x: float, y: float, r: float) -> None:
+def _tomato(canvas: Pen, x: float, y: float, r: float) -> None:
     red = PALETTE["tomato"]
     canvas.ellipse(x, y, r, r * 0.92, mix(red, "#5a0f0c", 0.35))
     canvas.ellipse(x - r * 0.04, y - r * 0.06, r * 0.92, r * 0.84, red)
@@ -27,7 +28,7 @@ def _tomato(canvas: Canvas, x: float, y: float, r: float) -> None:
     canvas.stroke([(x, y - 0.62 * r), (x + 0.08 * r, y - 0.98 * r)], 0.17 * r, mix(PALETTE["leaf"], "#000000", 0.2))
 
 
-def _onion(canvas: Canvas, x: float, y: float, r: float) -> None:
+def _onion(canvas: Pen, x: float, y: float, r: float) -> None:
     gold, brown = PALETTE["onion"], mix(PALETTE["onion"], "#7a3f12", 0.6)
     bulb = [
         (x + r * (0.98 * math.sin(a)) * (1 - 0.10 * math.cos(a)), y + 0.12 * r - 0.86 * r * math.cos(a))
@@ -53,7 +54,7 @@ def _onion(canvas: Canvas, x: float, y: float, r: float) -> None:
     canvas.stroke([(x - 0.14 * r, y + r * 0.98), (x + 0.14 * r, y + r * 0.98)], 0.12 * r, brown)
 
 
-def _cabbage(canvas: Canvas, x: float, y: float, r: float) -> None:
+def _cabbage(canvas: Pen, x: float, y: float, r: float) -> None:
     green = PALETTE["cabbage"]
     dark, pale = mix(green, "#1f4d12", 0.5), mix(green, "#f4ffd8", 0.55)
     for dx, dy, size in (
@@ -73,7 +74,7 @@ def _cabbage(canvas: Canvas, x: float, y: float, r: float) -> None:
         canvas.stroke([(x, y), (x + side * 0.22 * r, y - 0.28 * r)], 0.07 * r, pale)
 
 
-def _fish(canvas: Canvas, x: float, y: float, r: float) -> None:
+def _fish(canvas: Pen, x: float, y: float, r: float) -> None:
     blue = PALETTE["fish"]
     dark, belly = mix(blue, "#12284a", 0.45), mix(blue, "#ffffff", 0.62)
     canvas.polygon(
@@ -89,7 +90,7 @@ def _fish(canvas: Canvas, x: float, y: float, r: float) -> None:
     canvas.circle(x - 0.72 * r, y - 0.11 * r, 0.09 * r, "#14202e")
 
 
-_DRAW: Final[dict[str, Callable[[Canvas, float, float, float], None]]] = {
+_DRAW: Final[dict[str, Callable[[Pen, float, float, float], None]]] = {
     "tomato": _tomato,
     "onion": _onion,
     "cabbage": _cabbage,
@@ -97,7 +98,7 @@ _DRAW: Final[dict[str, Callable[[Canvas, float, float, float], None]]] = {
 }
 
 
-def draw_ingredient(canvas: Canvas, kind: str, x: float, y: float, radius: float) -> None:
+def draw_ingredient(canvas: Pen, kind: str, x: float, y: float, radius: float) -> None:
     """One whole ingredient of about the given radius round a point."""
     _DRAW[kind](canvas, x, y, radius)
 
@@ -110,7 +111,7 @@ def soup_colour(contents: Sequence[str]) -> str:
     return mix(colour, "#ffcf87", 0.22)
 
 
-def draw_pieces(canvas: Canvas, contents: Sequence[str], x: float, y: float, radius: float) -> None:
+def draw_pieces(canvas: Pen, contents: Sequence[str], x: float, y: float, radius: float) -> None:
     """Ingredients arranged inside a circle of the given radius, smaller the more there are."""
     count = len(contents)
     if count == 1:
@@ -125,7 +126,7 @@ def draw_pieces(canvas: Canvas, contents: Sequence[str], x: float, y: float, rad
         draw_ingredient(canvas, kind, x + around * math.cos(angle), y + around * math.sin(angle), each)
 
 
-def draw_plate(canvas: Canvas, x: float, y: float, radius: float) -> None:
+def draw_plate(canvas: Pen, x: float, y: float, radius: float) -> None:
     """An empty dish seen from above."""
     white = PALETTE["dish"]
     canvas.ellipse(x, y + radius * 0.1, radius, radius, PALETTE["shadow"], 0.28)
@@ -135,7 +136,7 @@ def draw_plate(canvas: Canvas, x: float, y: float, radius: float) -> None:
     canvas.circle(x, y + radius * 0.04, radius * 0.59, mix(white, "#8a93a0", 0.1))
 
 
-def draw_item(canvas: Canvas, item: Item, x: float, y: float, radius: float) -> None:
+def draw_item(canvas: Pen, item: Item, x: float, y: float, radius: float) -> None:
     """Anything a player can hold: an ingredient, a dish, or a dish of soup."""
     if item.kind in INGREDIENTS:
         draw_ingredient(canvas, item.kind, x, y, radius)

@@ -7,12 +7,21 @@ from functools import lru_cache
 from typing import Final
 
 from legible_envs.drawing.canvas import Canvas, Sprite, mix
+from legible_envs.drawing.svg_canvas import Pen
 from legible_envs.overcooked.grid import NEIGHBOURS
 from legible_envs.overcooked.layout import COUNTER, FLOOR, OBSTACLE, STATION_TYPES
 from legible_envs.overcooked.rendering.food import draw_ingredient
 from legible_envs.overcooked.rendering.palette import PALETTE
 
-__all__ = ["COUNTER_TOP", "tile_sprite"]
+__all__ = [
+    "COUNTER_TOP",
+    "draw_counter",
+    "draw_edges",
+    "draw_floor",
+    "draw_light",
+    "draw_station",
+    "tile_sprite",
+]
 
 COUNTER_TOP: Final = 0.42
 """Height at which objects stand on a counter, in tiles from the top of its cell."""
@@ -20,7 +29,8 @@ COUNTER_TOP: Final = 0.42
 _FRONT: Final = 0.18  # how much of a counter's cell shows its front
 
 
-def _floor(canvas: Canvas, around: int, odd: bool) -> None:
+def draw_floor(canvas: Pen, around: int, odd: bool) -> None:
+    """Floor, with the shadow of a counter to the north (bit 0 of ``around``) and to the west (bit 1)."""
     canvas.rectangle(0, 0, 1, 1, PALETTE["floor_line"])
     colour = PALETTE["floor_alternate" if odd else "floor"]
     canvas.rectangle(0.012, 0.012, 0.976, 0.976, colour)
@@ -33,7 +43,8 @@ def _floor(canvas: Canvas, around: int, odd: bool) -> None:
             canvas.rectangle(0, 0, depth, 1, PALETTE["shadow"], 0.07)
 
 
-def _counter(canvas: Canvas, front: bool, odd: bool) -> None:
+def draw_counter(canvas: Pen, front: bool, odd: bool) -> None:
+    """A counter, whose front shows where no other one stands below it."""
     wood = mix(PALETTE["counter"], PALETTE["counter_light"], 0.16 if odd else 0.0)
     canvas.rectangle(0, 0, 1, 1, wood)
     light, line = PALETTE["counter_light"], PALETTE["counter_line"]
@@ -51,13 +62,23 @@ def _counter(canvas: Canvas, front: bool, odd: bool) -> None:
     canvas.rectangle(0.986, 1 - _FRONT, 0.014, _FRONT, PALETTE["counter_dark"], 0.7)
 
 
-def _obstacle(canvas: Canvas, around: int) -> None:
-    """Light projected on the floor; edges only where the neighbour (bits N, E, S, W, then NE, SE, SW, NW) is none."""
+def _obstacle(canvas: Pen, around: int) -> None:
+    """Light projected on the floor, with edges where there are no neighbouring obstacles."""
+    draw_light(canvas)
+    draw_edges(canvas, around)
+
+
+def draw_light(canvas: Pen) -> None:
+    """The light of a virtual obstacle without its edges."""
     canvas.rectangle(0, 0, 1, 1, PALETTE["obstacle"], 0.7)
     for k in range(-4, 5):  # the stripes meet those of the neighbouring cells
         canvas.polygon(
             [(k / 4, 1), (k / 4 + 0.085, 1), (k / 4 + 1.085, 0), (k / 4 + 1, 0)], PALETTE["obstacle_light"], 0.55
         )
+
+
+def draw_edges(canvas: Pen, around: int) -> None:
+    """Edges of a virtual obstacle where the neighbour (bits N, E, S, W, then NE, SE, SW, NW) is none."""
     edge, width = PALETTE["obstacle_edge"], 0.075
     sides = ((0, 0, 1, width), (1 - width, 0, width, 1), (0, 1 - width, 1, width), (0, 0, width, 1))
     for bit, side in enumerate(sides):
@@ -68,7 +89,7 @@ def _obstacle(canvas: Canvas, around: int) -> None:
             canvas.rectangle(x, y, width, width, edge)
 
 
-def _crate(canvas: Canvas, kind: str, spots: tuple[tuple[float, float], ...], radius: float) -> None:
+def _crate(canvas: Pen, kind: str, spots: tuple[tuple[float, float], ...], radius: float) -> None:
     wood, dark = PALETTE["crate"], PALETTE["crate_dark"]
     canvas.rectangle(0.07, 0.13, 0.88, 0.7, PALETTE["shadow"], 0.3, radius=0.06)
     canvas.rectangle(0.07, 0.08, 0.86, 0.7, dark, radius=0.06)
@@ -84,19 +105,19 @@ def _crate(canvas: Canvas, kind: str, spots: tuple[tuple[float, float], ...], ra
         canvas.circle(x + 0.04, 0.73, 0.016, dark)
 
 
-def _tomatoes(canvas: Canvas, out: int) -> None:
+def _tomatoes(canvas: Pen, out: int) -> None:
     _crate(canvas, "tomato", ((0.36, 0.26), (0.65, 0.26), (0.27, 0.45), (0.51, 0.44), (0.74, 0.45)), 0.165)
 
 
-def _onions(canvas: Canvas, out: int) -> None:
+def _onions(canvas: Pen, out: int) -> None:
     _crate(canvas, "onion", ((0.36, 0.26), (0.65, 0.26), (0.27, 0.44), (0.51, 0.44), (0.74, 0.44)), 0.155)
 
 
-def _cabbages(canvas: Canvas, out: int) -> None:
+def _cabbages(canvas: Pen, out: int) -> None:
     _crate(canvas, "cabbage", ((0.5, 0.23), (0.31, 0.42), (0.69, 0.42)), 0.205)
 
 
-def _fishes(canvas: Canvas, out: int) -> None:
+def _fishes(canvas: Pen, out: int) -> None:
     steel, dark, ice = PALETTE["steel"], PALETTE["steel_dark"], PALETTE["ice"]
     canvas.rectangle(0.07, 0.13, 0.88, 0.7, PALETTE["shadow"], 0.3, radius=0.06)
     canvas.rectangle(0.07, 0.08, 0.86, 0.72, dark, radius=0.06)
@@ -113,7 +134,7 @@ def _fishes(canvas: Canvas, out: int) -> None:
     canvas.rectangle(0.38, 0.69, 0.24, 0.05, dark, radius=0.025)
 
 
-def _dishes(canvas: Canvas, out: int) -> None:
+def _dishes(canvas: Pen, out: int) -> None:
     white = PALETTE["dish"]
     rim = mix(white, "#6f7b8c", 0.55)
     canvas.ellipse(0.5, 0.68, 0.4, 0.14, PALETTE["shadow"], 0.35)
@@ -125,7 +146,7 @@ def _dishes(canvas: Canvas, out: int) -> None:
     canvas.ellipse(0.5, 0.335, 0.235, 0.1, mix(white, rim, 0.25))
 
 
-def _stove(canvas: Canvas, out: int) -> None:
+def _stove(canvas: Pen, out: int) -> None:
     dark = PALETTE["stove"]
     canvas.rectangle(0.03, 0.03, 0.94, 0.79, mix(dark, "#000000", 0.4), radius=0.08)
     canvas.rectangle(0.03, 0.02, 0.94, 0.77, dark, radius=0.08)
@@ -134,7 +155,7 @@ def _stove(canvas: Canvas, out: int) -> None:
     canvas.circle(0.5, COUNTER_TOP, 0.32, mix(dark, "#ffffff", 0.08))
 
 
-def _serving(canvas: Canvas, out: int) -> None:
+def _serving(canvas: Pen, out: int) -> None:
     """A hatch with a domed dish in front of it and arrows that point away from the room (0 N, 1 S, 2 E, 3 W)."""
     green = PALETTE["serving"]
     canvas.rectangle(0.04, 0.06, 0.92, 0.76, PALETTE["shadow"], 0.3, radius=0.08)
@@ -148,7 +169,7 @@ def _serving(canvas: Canvas, out: int) -> None:
     _cloche(canvas, 0.5 - dx * 0.13, 0.53 - dy * 0.14)
 
 
-def _cloche(canvas: Canvas, x: float, y: float) -> None:
+def _cloche(canvas: Pen, x: float, y: float) -> None:
     """A domed dish, its plate's centre at the point."""
     gold = PALETTE["flame_light"]
     canvas.ellipse(x, y + 0.03, 0.28, 0.07, PALETTE["shadow"], 0.4)
@@ -168,7 +189,7 @@ def _cloche(canvas: Canvas, x: float, y: float) -> None:
     canvas.circle(x, y - 0.285, 0.045, mix(gold, "#8a5a10", 0.35))
 
 
-_STATIONS: Final[tuple[Callable[[Canvas, int], None], ...]] = (
+_STATIONS: Final[tuple[Callable[[Pen, int], None], ...]] = (
     _tomatoes,
     _onions,
     _cabbages,
@@ -177,6 +198,12 @@ _STATIONS: Final[tuple[Callable[[Canvas, int], None], ...]] = (
     _stove,
     _serving,
 )
+
+
+def draw_station(canvas: Pen, code: int, out: int) -> None:
+    """A station without the counter under it and without the pot on a stove; ``out`` as for :func:`tile_sprite`."""
+    assert len(_STATIONS) == len(STATION_TYPES)
+    _STATIONS[code - OBSTACLE - 1](canvas, out)
 
 
 @lru_cache(maxsize=1024)
@@ -193,12 +220,11 @@ def tile_sprite(code: int, around: int, odd: bool, out: int, size: int) -> Sprit
     """
     canvas = Canvas(size)
     if code == FLOOR:
-        _floor(canvas, around, odd)
+        draw_floor(canvas, around, odd)
     elif code == OBSTACLE:
         _obstacle(canvas, around)
     else:
-        _counter(canvas, bool(around & 1), odd)
+        draw_counter(canvas, bool(around & 1), odd)
         if code != COUNTER:
-            _STATIONS[code - OBSTACLE - 1](canvas, out)
-            assert len(_STATIONS) == len(STATION_TYPES)
+            draw_station(canvas, code, out)
     return canvas.sprite()

@@ -36,6 +36,7 @@ from legible_envs.legibility import (
     PrefixScore,
     env_legibility,
     optimal_costs,
+    posterior,
     prefix_weights,
     tied_goals,
 )
@@ -239,11 +240,12 @@ def boltzmann_legibility(
     for node in {visit.node for visit in trajectories.visits}:
         remaining = {g: costs[g].get(node, math.inf) for g in goals}
         value = env_legibility(trajectories.goal, remaining, optimal, 1, observer)
-        seen[node] = tuple(tied_goals(remaining, optimal, observer.tie_tolerance)), value
+        belief = posterior(remaining, optimal, observer.beta)
+        seen[node] = tuple(tied_goals(remaining, optimal, observer.tie_tolerance)), value, belief
     scores = []
     for step, node, probability, weight in trajectories.visits:
-        top, value = seen[node]
+        top, value, belief = seen[node]
         # A margin is the same at any step; an error costs in proportion to the steps, so that of one step says it all.
         value = value if top == (trajectories.goal,) else step * value
-        scores.append(PrefixScore(step, node, 0, probability, weight, top, value))
+        scores.append(PrefixScore(step, node, 0, probability, weight, top, value, belief))
     return scores

@@ -232,7 +232,8 @@ def explain_layout(
         ``weight`` (expected number of such stages), ``score`` (expected legibility of its trajectories),
         ``contribution`` (weight times score; contributions sum to the layout's score), ``ties_with`` (probability that
         each other goal is at the top, averaged over the weighted prefixes: together with the true one, or instead of
-        it where people leave the shortest paths), and ``prefixes``: a row for every step ``t`` with the mean ``value``
+        it where people leave the shortest paths), ``belief`` (how probable the observer finds each goal by Eq. 1, the
+        mean over the weighted prefixes), and ``prefixes``: a row for every step ``t`` with the mean ``value``
         of Eq. 2, its ``weight`` and ``ties_with`` at that step.
 
     Raises:
@@ -250,6 +251,7 @@ def explain_layout(
                 "score": score,
                 "contribution": weight * score,
                 "ties_with": _tie_shares(goal, scores),
+                "belief": _mean_belief(scores),
                 "prefixes": [_prefix_row(goal, t, scores) for t in sorted({s.step for s in scores})],
             }
         )
@@ -264,6 +266,17 @@ def _tie_shares(goal: str, scores: list[PrefixScore]) -> dict[str, float]:
             if other != goal and total:
                 shares[str(other)] += s.probability * s.weight / total
     return dict(shares)
+
+
+def _mean_belief(scores: list[PrefixScore]) -> dict[str, float]:
+    """How probable an observer finds each goal (Eq. 1), the mean over the weighted prefixes."""
+    total = math.fsum(s.probability * s.weight for s in scores)
+    if not scores or not total:
+        return {}
+    return {
+        str(goal): math.fsum(s.probability * s.weight * s.belief[goal] for s in scores) / total
+        for goal in scores[0].belief
+    }
 
 
 def _prefix_row(goal: str, step: int, scores: list[PrefixScore]) -> dict[str, Any]:

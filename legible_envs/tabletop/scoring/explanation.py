@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.errors import LayoutError
-from legible_envs.legibility import env_legibility, tied_goals
+from legible_envs.legibility import env_legibility, posterior, tied_goals
 from legible_envs.observer import ObserverModel
 from legible_envs.tabletop.geometry.paths import ShortestPaths
 from legible_envs.tabletop.layout import TabletopLayout
@@ -144,9 +144,10 @@ def explain_layout(
         A row for every stage and goal, the greatest loss first: ``start``, ``goals`` (valid), ``goal`` (true),
         ``weight`` (expected number of such stages), ``score`` (expected legibility of the trajectory), ``contribution``
         (weight times score; contributions sum to the layout's score), ``length`` and ``detour`` of the trajectory,
-        ``ties_with`` (share of the prefixes at which each other goal ties with the true one), and ``prefixes``: a row
-        for every prefix with the observed ``fraction``, ``t`` in the observer's units, its ``weight``, ``value`` of
-        Eq. 2 and ``ties_with``.
+        ``ties_with`` (share of the prefixes at which each other goal ties with the true one), ``belief`` (how probable
+        the observer finds each goal by Eq. 1, the mean over the prefixes), and ``prefixes``: a row for every prefix
+        with the observed ``fraction``, ``t`` in the observer's units, its ``weight``, ``value`` of Eq. 2,
+        ``ties_with`` and ``belief``.
 
     Raises:
         LayoutError: The layout has other objects than the task, or a goal cannot be reached.
@@ -181,6 +182,7 @@ def explain_layout(
                         "weight": 1 / len(fractions),
                         "value": env_legibility(goal, remaining, optimal, observed, observer),
                         "ties_with": others,
+                        "belief": posterior(remaining, optimal, observer.beta),
                     }
                 )
             score = math.fsum(p["value"] for p in prefixes) / len(fractions)
@@ -195,6 +197,7 @@ def explain_layout(
                     "length": length,
                     "detour": _detour(length, home, layout.place(goal)),
                     "ties_with": _shares(prefixes),
+                    "belief": {g: math.fsum(p["belief"][g] for p in prefixes) / len(prefixes) for g in stage.goals},
                     "prefixes": [{**p, "ties_with": dict.fromkeys(p["ties_with"], 1.0)} for p in prefixes],
                 }
             )
