@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from decimal import ROUND_HALF_UP, Context, Decimal
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -13,7 +15,7 @@ if TYPE_CHECKING:
     from legible_envs.overcooked.layout import OvercookedLayout
     from legible_envs.tabletop import TabletopLayout
 
-__all__ = ["kitchen_text", "number", "say", "table", "table_text"]
+__all__ = ["kitchen_text", "number", "plural", "say", "table", "table_text"]
 
 _PLAIN = {"X": "##", "V": "[]", " ": "  "}
 _FANCY = {"X": "▒▒", "V": "[]", " ": "  "}
@@ -143,5 +145,35 @@ def _text(value: Any) -> str | RenderableType:
 
 
 def number(value: float | None, digits: int = 2) -> str:
-    """A number for reading, a dash where there is none."""
-    return "-" if value is None or value != value else f"{value:,.{digits}f}"
+    """A number for reading, a dash where there is none; the one rule by which numbers are rounded here.
+
+    The exact value is rounded once, halves away from zero, as the scripts of the reports do: whatever shows a number
+    must be given it unrounded, or two places may differ in the last digit. Zero has no sign.
+
+    Example:
+        >>> number(-25.17499), number(0.125), number(1234.5, 0), number(-0.001), number(None)
+        ('-25.17', '0.13', '1,235', '0.00', '-')
+    """
+    if value is None or math.isnan(value):
+        return "-"
+    if math.isinf(value):
+        return str(value)
+    exact = Decimal(float(value))
+    rounded = exact.quantize(Decimal(1).scaleb(-digits), ROUND_HALF_UP, _AS_LONG_AS_IT_TAKES)
+    return f"{rounded if rounded else abs(rounded):,f}"
+
+
+_AS_LONG_AS_IT_TAKES = Context(prec=800)
+
+
+def plural(count: int, noun: str) -> str:
+    """A number of things: the noun with an s unless there is one; a noun in y ends in ies.
+
+    Example:
+        >>> plural(1, "evaluation"), plural(2_000, "evaluation"), plural(0, "trajectory")
+        ('1 evaluation', '2,000 evaluations', '0 trajectories')
+    """
+    if count == 1:
+        return f"1 {noun}"
+    many = f"{noun[:-1]}ies" if noun.endswith("y") and noun[-2:-1] not in "aeiou" else f"{noun}s"
+    return f"{count:,} {many}"

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from benchmarks.cli.destinations import DestinationFolder
+
 if TYPE_CHECKING:
     import pandas as pd
     from rich.console import Console
@@ -22,7 +24,7 @@ __all__ = ["evaluate", "evaluate_predictors"]
 @click.option("--neural/--no-neural", default=None, help="Evaluate networks too. [default: where torch is installed]")
 @click.option("--layout", "layouts", multiple=True, metavar="NAME", help="Only this kitchen; repeatable.")
 @click.option("--repeats", type=click.IntRange(min=1), default=3, show_default=True, help="Of the cross-validation.")
-@click.option("--out", type=click.Path(file_okay=False, path_type=Path), help="Folder to write tables to.")
+@click.option("--out", type=DestinationFolder(), help="Folder to write tables to.")
 def evaluate(
     folder: Path | None,
     pointing: Path | None,

@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from benchmarks.cli.destinations import check_folder
+from benchmarks.cli.options import out_folder
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -109,7 +112,7 @@ def _run_part(module: str, folder: Path, how: Mapping[str, Any]) -> list[Section
 @click.argument("experiment", type=click.Choice(list(EXPERIMENTS)))
 @click.option("--quick", is_flag=True, help="A version of two minutes.")
 @click.option("--seeds", type=click.IntRange(min=1), help="Seeds, in place of the experiment's own number.")
-@click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Folder to write to.")
+@out_folder
 @click.option("--workers", type=click.IntRange(min=1), help="Processes on this machine. [default: all cores]")
 @click.option("--scheduler", metavar="ADDRESS", help="Run on a Dask cluster, e.g. tcp://10.0.0.1:8786.")
 @click.option("--quiet", is_flag=True, help="Show no progress.")

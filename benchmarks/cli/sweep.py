@@ -6,12 +6,15 @@ from pathlib import Path
 
 import click
 
+from benchmarks.cli.destinations import check_folder
+from benchmarks.cli.options import out_folder
+
 __all__ = ["sweep"]
 
 
 @click.command()
 @click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
-@click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Folder to write to.")
+@out_folder
 @click.option("--workers", type=click.IntRange(min=1), help="Processes on this machine. [default: all cores]")
 @click.option("--scheduler", metavar="ADDRESS", help="Run on a Dask cluster, e.g. tcp://10.0.0.1:8786.")
 @click.option("--quiet", is_flag=True, help="Show no progress.")
