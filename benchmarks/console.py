@@ -167,13 +167,14 @@ _AS_LONG_AS_IT_TAKES = Context(prec=800)
 
 
 def plural(count: int, noun: str) -> str:
-    """A number of things: the noun with an s unless there is one; a noun in y ends in ies.
+    """A number of things, with the noun in the singular or the plural.
 
     Example:
-        >>> plural(1, "evaluation"), plural(2_000, "evaluation"), plural(0, "trajectory")
-        ('1 evaluation', '2,000 evaluations', '0 trajectories')
+        >>> plural(1, "evaluation"), plural(2_000, "evaluation"), plural(0, "trajectory"), plural(2, "search")
+        ('1 evaluation', '2,000 evaluations', '0 trajectories', '2 searches')
     """
     if count == 1:
         return f"1 {noun}"
-    many = f"{noun[:-1]}ies" if noun.endswith("y") and noun[-2:-1] not in "aeiou" else f"{noun}s"
-    return f"{count:,} {many}"
+    if noun.endswith("y") and noun[-2] not in "aeiou":
+        return f"{count:,} {noun[:-1]}ies"
+    return f"{count:,} {noun}{'es' if noun.endswith(('s', 'x', 'ch', 'sh')) else 's'}"

@@ -20,7 +20,7 @@ from benchmarks.cli.options import (
     task_option,
     workspace_option,
 )
-from benchmarks.cli.program import Commands, Program
+from benchmarks.cli.program import STOPPED, Commands, Program
 from benchmarks.cli.reproduce import reproduce
 from benchmarks.cli.sweep import sweep
 from legible_envs import __version__
@@ -102,10 +102,17 @@ main.add_command(reproduce)
 @click.option("--iterations", nargs=2, type=click.IntRange(min=0), metavar="RANDOM CLIMBS",
               help="The paper's budget instead: random layouts, then climbs, each to its end.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
-@click.option("--max-distance", type=PositiveNumber(), help="Refuse layouts whose task takes longer than this (steps, metres).")
+@click.option(
+    "--max-distance", type=PositiveNumber(), help="Refuse layouts whose task takes longer than this (steps, metres)."
+)
 @click.option("--start-from", metavar="LAYOUT", help="Begin with this layout; a kitchen also sets the shape.")
 @click.option("--lock", multiple=True, metavar="STATION", help="Kitchens: leave this station where it is; repeatable.")
-@click.option("--relocation-cost", type=PositiveNumber(zero=True), default=0.0, help="Kitchens: cost of each moved station, in score.")
+@click.option(
+    "--relocation-cost",
+    type=PositiveNumber(zero=True),
+    default=0.0,
+    help="Kitchens: cost of each moved station, in score.",
+)
 @click.option("--set", "assigned", multiple=True, type=Assignment(), metavar="NAME=VALUE",
               help="Another setting of the workspace; repeatable.")  # fmt: skip
 @click.option("--resume", is_flag=True, help="Continue the search in the --out folder, with its own settings.")
@@ -144,7 +151,8 @@ def report(run: Path) -> None:
     """
     from benchmarks.cli.optimize import write_pictures
 
-    click.echo(f"report: {write_pictures(run)['report']}")
+    check_folder(run)
+    click.echo(f"report: {click.format_filename(write_pictures(run)['report'])}")
 
 
 @main.command()
@@ -207,7 +215,13 @@ def score(
     trajectories in the --trajectories file, and writes tables, figures and a page into the --out folder; where LAYOUT
     is the folder of a search, into its people folder, and a section into its report.
     """
-    from benchmarks.cli.layouts import print_predictions, save_evaluation, score_lines, trajectories_in
+    from benchmarks.cli.layouts import (
+        evaluation_folder,
+        print_predictions,
+        save_evaluation,
+        score_lines,
+        trajectories_in,
+    )
     from benchmarks.presenters.registry import load_design
 
     given = given_options(ctx, (*settings, "by_participant", "out"))
@@ -216,6 +230,8 @@ def score(
     if given and not predictors:
         raise click.UsageError(f"--{given[0].replace('_', '-')} is about --predictor, which is not given")
     design = load_design(layout, workspace=workspace, prefix=prefix, pots=pots, task=task)
+    if predictors and (folder := evaluation_folder(layout, out)) is not None:
+        check_folder(folder, "--out")
     for line in score_lines(design):
         click.echo(line)
     if trajectories is None:
@@ -263,13 +279,16 @@ def play(layout: str, fps: int, record: Path | None) -> None:
 
     Arrow keys or W A S D move, space or E interacts, Esc ends.
     """
+    from benchmarks.console import plural
     from benchmarks.presenters.overcooked import load_kitchen
     from legible_envs.overcooked.human_play import play as play_layout
 
     played = play_layout(load_kitchen(layout).layout, fps=fps, record=record)
-    click.echo(f"{len(played.actions):,} steps, reward {played.rewards.sum():g}")
+    click.echo(f"{plural(len(played.actions), 'step')}, reward {played.rewards.sum():g}")
     if record is not None and len(played.actions):
-        click.echo(f"recorded: {record}")
+        click.echo(f"recorded: {click.format_filename(record)}")
+    if played.interrupted:
+        raise click.exceptions.Exit(STOPPED)
 
 
 # -- recordings, demonstration, speed -------------------------------------------------------------------------

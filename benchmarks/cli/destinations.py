@@ -68,18 +68,19 @@ class DestinationFile(click.ParamType):
         return _folder_problem(path.parent)
 
 
-def check_folder(path: Path, option: str) -> None:
+def check_folder(path: Path, option: str | None = None) -> None:
     """Refuse a folder that no option named but that is written to all the same.
 
     Args:
         path: The folder.
-        option: The option that names another one.
+        option: The option that names another one, if there is one.
 
     Raises:
         click.UsageError: Nothing can be written there.
     """
     if problem := _folder_problem(path):
-        raise click.UsageError(f"cannot write the results: {problem}; choose another place with {option}")
+        advice = "" if option is None else f"; choose another place with {option}"
+        raise click.UsageError(f"the results cannot be written: {problem}{advice}")
 
 
 def _path(kind: click.ParamType, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:

@@ -117,12 +117,12 @@ def _networks_wanted(neural: bool | None, notes: list[str]) -> bool:
 
 
 def _print(console: Console, name: str, scores: pd.DataFrame, out: Path | None) -> None:
-    from benchmarks.console import table
+    from benchmarks.console import plural, table
     from benchmarks.experiments.prediction.analysis import accuracy_table, reference_rows, to_markdown
 
     rows = reference_rows(scores)
     numbers = scores.groupby("layout", sort=False)["walks"].first()
-    counts = ", ".join(f"{layout} {count:,} trajectories" for layout, count in numbers.items())
+    counts = ", ".join(f"{layout} {plural(int(count), 'trajectory')}" for layout, count in numbers.items())
     about = f"fraction f observed means {scores.attrs['definition']}; ties {scores.attrs['ties']}"
     console.print(f"{name}: mean accuracy over 10..90 % (difference from before)", style="bold")
     console.print(table(rows))

@@ -113,7 +113,9 @@ def _continued(before: Mapping[str, Any], settings: Mapping[str, Any], given: Co
 
 def _options_before(emitter: Any) -> Any:
     """The options of the emitter, or of each of several, in a manifest."""
-    return [_options_before(one) for one in emitter] if isinstance(emitter, list) else dict(emitter.get("options") or {})
+    return (
+        [_options_before(one) for one in emitter] if isinstance(emitter, list) else dict(emitter.get("options") or {})
+    )
 
 
 def _search_part(domain: str, part: Part, settings: Mapping[str, Any], out: Path) -> SearchResult:
@@ -190,7 +192,7 @@ def _tell(presenter: Presenter, result: SearchResult, parts: Collection[Part]) -
     for name, path in written.items():
         console.print(f"{name:<8}{path}", soft_wrap=True)
     if len(parts) > 1:
-        console.print(f"each of the {len(parts)} searches has a folder of its own there", style="dim")
+        console.print(f"each of the {plural(len(parts), 'search')} has a folder of its own there", style="dim")
 
 
 def found_lines(result: SearchResult, presenter: Presenter) -> list[str]:

@@ -17,13 +17,16 @@ __all__ = [
     "Assignment",
     "PositiveNumber",
     "Prefix",
+    "SchedulerAddress",
     "given_options",
     "layout_argument",
     "out_folder",
     "pots_option",
+    "scheduler_option",
     "settings_from",
     "task_option",
     "typed_value",
+    "workers_option",
     "workspace_option",
 ]
 
@@ -119,6 +122,22 @@ class PositiveNumber(click.ParamType):
         return number
 
 
+class SchedulerAddress(click.ParamType):
+    """The address of a Dask scheduler."""
+
+    name = "address"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """The address, which is one; whether anybody answers there is seen later."""
+        from optimizers.cluster import check_address
+
+        try:
+            check_address(str(value))
+        except ValueError as error:
+            self.fail(str(error), param, ctx)
+        return str(value)
+
+
 def given_options(ctx: click.Context, names: Sequence[str] | Mapping[str, Any]) -> list[str]:
     """Those options that the user gave, in the order of ``names``; the others have their defaults."""
     return [name for name in names if ctx.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT]
@@ -134,4 +153,10 @@ workspace_option = click.option(
 )
 task_option = click.option(
     "--task", metavar="NAME|FILE.yaml", help="Tables: what is built. [default: the one that fits]"
+)
+workers_option = click.option(
+    "--workers", type=click.IntRange(min=1), help="Processes on this machine. [default: all cores]"
+)
+scheduler_option = click.option(
+    "--scheduler", type=SchedulerAddress(), metavar="ADDRESS", help="Run on a Dask cluster, e.g. tcp://10.0.0.1:8786."
 )

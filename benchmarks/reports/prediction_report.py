@@ -10,6 +10,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from benchmarks.console import number as rounded
 from benchmarks.reports.experiment_report import write_tables
 from legible_envs.support.files import write_text
 
@@ -134,11 +135,13 @@ def _compare(
 
 def print_evaluation(console: Console, results: PredictionResults) -> None:
     """Print the figures of merit, accuracy against fraction observed, comparisons, and what they mean."""
-    from benchmarks.console import table
+    from benchmarks.console import plural, table
 
     found = results.evaluation
     number = found.table["trajectory"].nunique()
-    console.print(f"\n{number:,} trajectories: prediction of their goals, mean over fractions observed", style="bold")
+    console.print(
+        f"\n{plural(number, 'trajectory')}: prediction of their goals, mean over fractions observed", style="bold"
+    )
     console.print(table(_summary_rows(found)))
     console.print("Accuracy by fraction observed", style="bold")
     console.print(table(_accuracy_rows(found)))
@@ -311,5 +314,5 @@ def _environment() -> Any:
     from jinja2 import Environment, PackageLoader
 
     environment = Environment(loader=PackageLoader("benchmarks"), autoescape=True, trim_blocks=True, lstrip_blocks=True)
-    environment.filters["number"] = lambda value: "–" if value is None else f"{value:.3f}".replace("-", "\u2212")
+    environment.filters["number"] = lambda value: "–" if value is None else rounded(value, 3).replace("-", "\u2212")
     return environment

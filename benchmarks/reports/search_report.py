@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.console import number
 from benchmarks.presenters.base import Panel, Presenter, summary_of, template
 from benchmarks.presenters.losses import explains_stages, loss_row
 from benchmarks.presenters.registry import presenter_of_run
@@ -221,7 +222,7 @@ def _explained(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 
 def _plain(value: Any) -> Any:
-    """The same in types that JSON has; numbers to five digits, NaN and infinities as null."""
+    """The same in types that JSON has; numbers to nine digits, NaN and infinities as null."""
     if isinstance(value, np.ndarray):
         return _plain(value.tolist())
     if isinstance(value, Mapping):
@@ -233,7 +234,7 @@ def _plain(value: Any) -> Any:
     if isinstance(value, int | np.integer):
         return int(value)
     if isinstance(value, float | np.floating):
-        return float(f"{value:.5g}") if math.isfinite(value) else None
+        return float(f"{value:.9g}") if math.isfinite(value) else None
     return value if value is None or isinstance(value, str) else str(value)
 
 
@@ -381,4 +382,4 @@ def _number(value: Any, digits: int = 2) -> str:
     """A number for reading: thousands apart, a true minus sign, a dash where there is none."""
     if value is None:
         return "–"
-    return f"{value:,.{digits}f}".replace("-", "\u2212").replace(",", "\u202f")
+    return number(value, digits).replace("-", "\u2212").replace(",", "\u202f")
