@@ -99,7 +99,7 @@ main.add_command(reproduce)
 @click.option("--emitter-option", "emitter_options", multiple=True, type=Assignment(), metavar="NAME=VALUE",
               help="An option of the emitter, such as sigma=0.5; repeatable.")  # fmt: skip
 @click.option("--evaluations", type=click.IntRange(min=1), help="Layouts to score. [default: 200000]")
-@click.option("--iterations", nargs=2, type=click.IntRange(min=0), metavar="RANDOM CLIMBS",
+@click.option("--iterations", nargs=2, type=click.IntRange(0, 10_000_000), metavar="RANDOM CLIMBS",
               help="The paper's budget instead: random layouts, then climbs, each to its end.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 @click.option(

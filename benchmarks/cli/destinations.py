@@ -54,18 +54,18 @@ class DestinationFile(click.ParamType):
 
     def _problem(self, path: Path, given: str) -> str:
         shown = click.format_filename(path)
-        if path.is_dir() or given.endswith(("/", os.sep)):
-            return f"{shown} is a folder; name a file in it"
-        if path.suffix.lower() not in self.suffixes:
-            return f"{shown} must end in {' or '.join(self.suffixes)}: nothing else is written"
         try:
+            if path.is_dir() or given.endswith(("/", os.sep)):
+                return f"{shown} is a folder; name a file in it"
+            if path.suffix.lower() not in self.suffixes:
+                return f"{shown} must be a name that ends in {' or '.join(self.suffixes)}: nothing else is written"
             if not stat.S_ISREG(path.stat().st_mode):
                 return f"{shown} is no plain file and cannot be replaced by one"
         except FileNotFoundError:
             pass
         except OSError:
             return _folder_problem(path)  # the way there is at fault
-        return _folder_problem(path.parent)
+        return _folder_problem(path.parent) or _name_problem(path)
 
 
 def check_folder(path: Path, option: str | None = None) -> None:
@@ -101,8 +101,13 @@ def _folder_problem(path: Path) -> str:
             pass
     except OSError as error:
         return f"{shown} cannot be written to: {error.strerror or error}"
+    return _name_problem(path)
+
+
+def _name_problem(path: Path) -> str:
+    """Why a path has no names that files can have; empty where it has."""
     if any(len(os.fsencode(part)) > _LONGEST for part in path.parts):
-        return f"{shown} cannot be written to: a name in it is longer than {_LONGEST} bytes"
+        return f"{click.format_filename(path)} cannot be written to: a name in it is longer than {_LONGEST} bytes"
     return ""
 
 

@@ -83,7 +83,10 @@ def run_search(domain: str, out: Path, settings: Mapping[str, Any], given: Colle
         if not _same_workspace(str(config.get("workspace")), domain):
             raise SearchError(f"{out} holds a search of {config.get('workspace')!r}, not of {domain!r}")
         settings = _continued(before, settings, given)
-    config |= presenter.design(settings) | settings_from(settings.get("assigned", ()), "--set")
+    assigned = settings_from(settings.get("assigned", ()), "--set")
+    if "workspace" in assigned:
+        raise click.UsageError("--set workspace does not apply: the workspace is the first argument")
+    config |= presenter.design(settings) | assigned
     parts = presenter.parts(config, settings, out)
     results = [_search_part(domain, part, settings, out) for part in parts]
     _tell(presenter, results[0], parts)
@@ -142,7 +145,7 @@ def _search_part(domain: str, part: Part, settings: Mapping[str, Any], out: Path
         )
     except EmitterError as error:
         if re.search("missing|option|required", str(error)) and "--emitter-option" not in str(error):
-            raise EmitterError(f"{error} (the option --emitter-option NAME=VALUE gives an emitter its own)") from error
+            raise EmitterError(f"{error} (--emitter-option NAME=VALUE sets an option)") from error
         raise
     except SearchInterrupted as stop:
         _tell_stopped(domain, part, out, stop.partial)

@@ -15,6 +15,7 @@ from benchmarks.cli.destinations import DestinationFolder
 
 __all__ = [
     "Assignment",
+    "LayoutSource",
     "PositiveNumber",
     "Prefix",
     "SchedulerAddress",
@@ -138,13 +139,25 @@ class SchedulerAddress(click.ParamType):
         return str(value)
 
 
+class LayoutSource(click.ParamType):
+    """A file, the folder of a search, or ``-``."""
+
+    name = "layout"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """The source, which has a name."""
+        if not str(value).strip():
+            self.fail("the name of the layout is empty", param, ctx)
+        return str(value)
+
+
 def given_options(ctx: click.Context, names: Sequence[str] | Mapping[str, Any]) -> list[str]:
     """Those options that the user gave, in the order of ``names``; the others have their defaults."""
     return [name for name in names if ctx.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT]
 
 
 out_folder = click.option("--out", type=DestinationFolder(), help="Folder to write to.")
-layout_argument = click.argument("layout", metavar="LAYOUT")
+layout_argument = click.argument("layout", metavar="LAYOUT", type=LayoutSource())
 pots_option = click.option(
     "--pots", type=click.IntRange(min=1), help="Kitchens: soups in progress at once. [default: no limit]"
 )

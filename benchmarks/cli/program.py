@@ -22,6 +22,9 @@ __all__ = ["STOPPED", "Commands", "Program", "leave"]
 STOPPED: Final = 130
 """Exit code of a command that Ctrl-C ended."""
 
+_LONGEST: Final = 1_000
+"""Characters of a message; the middle of a longer one, such as of a value of many digits, is left out."""
+
 _COLOUR_CODES: Final = re.compile(r"\x1b\[[0-9;]*m")
 
 
@@ -69,6 +72,8 @@ class Program(Commands):
             code = found if isinstance(found, int) else 0
             _flush()
         except click.ClickException as error:
+            if len(error.message) > _LONGEST:
+                error.message = f"{error.message[: _LONGEST // 2]} … {error.message[-_LONGEST // 2 :]}"
             error.show()
             code = error.exit_code
         except (click.Abort, KeyboardInterrupt):
@@ -91,6 +96,8 @@ def _one_line_errors(show_traceback: bool) -> Iterator[None]:
 
 
 def _message(error: BaseException) -> str:
+    if isinstance(error, RecursionError):
+        return "the input is nested too deeply to be read"
     if isinstance(error, MemoryError):
         return "there is not enough memory for this"
     if isinstance(error, OSError) and error.strerror:
