@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Sequence
 from decimal import ROUND_HALF_UP, Context, Decimal
 from typing import TYPE_CHECKING, Any
@@ -22,11 +23,14 @@ _FANCY = {"X": "▒▒", "V": "[]", " ": "  "}
 
 
 def say() -> Console:
-    """The console that commands print to: standard output, wide enough for panels when it is not a terminal."""
+    """The console that commands print to: standard output, wide enough for panels when it is not a terminal.
+
+    ``COLUMNS`` sets another width.
+    """
     from rich.console import Console
 
     console = Console(highlight=False, soft_wrap=False)
-    return console if console.is_terminal else Console(highlight=False, width=120)
+    return console if console.is_terminal or "COLUMNS" in os.environ else Console(highlight=False, width=120)
 
 
 def kitchen_text(console: Console, layout: OvercookedLayout) -> Text:

@@ -74,8 +74,9 @@ class Program(Commands):
         except click.ClickException as error:
             if len(error.message) > _LONGEST:
                 error.message = f"{error.message[: _LONGEST // 2]} … {error.message[-_LONGEST // 2 :]}"
-            error.show()
             code = error.exit_code
+            with contextlib.suppress(AttributeError, OSError):  # there is no standard error to write to
+                error.show()
         except (click.Abort, KeyboardInterrupt):
             click.echo("stopped", err=True)
             code = STOPPED
@@ -144,7 +145,10 @@ def _discard_output() -> None:
 
 
 def leave(code: int) -> NoReturn:
-    """End the process; another Ctrl-C while it ends does so at once, without a word."""
+    """End the process; further Ctrl-C do not change its exit code while Python cleans up."""
     with contextlib.suppress(ValueError):  # not the main thread
-        signal.signal(signal.SIGINT, lambda *_: os._exit(STOPPED))
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # Where Ctrl-C interrupted an exec() of a library, Python remembers that and would end by the signal, not by the
+    # exit code, although it was handled; the next exec() makes it forget.
+    exec("")
     sys.exit(code)
