@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import tomllib
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date, datetime, time
@@ -134,8 +135,13 @@ class Sweep:
             objectives=tuple(_listed(data.get("objectives", ["legibility"]), str, "objectives")),
             evaluations=tuple(_integers(data.get("evaluations", [100_000]), "evaluations", 1)),
             seeds=_seeds(data.get("seeds", 1)),
-            prediction={named.label: _prediction(shared | dict(named.own), named.label) for named in workspaces},
+            prediction={
+                named.label: _prediction(shared | dict(named.own), f" of workspace {named.label!r}")
+                for named in workspaces
+            },
         )
+        for name in _prediction(shared).predictors:  # also where every workspace has its own
+            _try(f"predictor {name!r}", lambda name=name: make_predictor(name))
         sweep._check()
         return sweep
 
@@ -168,8 +174,9 @@ class Sweep:
         for what, values in (("objectives", self.objectives), ("evaluations", self.evaluations), ("seeds", self.seeds)):
             if not values:
                 raise SweepError(f"`{what}` is empty; nothing would be run")
-            if twice := sorted({value for value in values if values.count(value) > 1}):
-                raise SweepError(f"`{what}` has {twice[0]!r} more than once")
+            if len(set(values)) < len(values):
+                twice = next(value for value, count in Counter(values).items() if count > 1)
+                raise SweepError(f"`{what}` has {twice!r} more than once")
         for name in self.objectives:
             choice("objectives", name, get_args(ObjectiveName), error=SweepError)
         axes = (self.workspaces, self.objectives, self.emitters, self.evaluations, self.seeds)
@@ -220,13 +227,15 @@ def _without(settings: Mapping[str, Any], key: str) -> dict[str, Any]:
     return {name: value for name, value in settings.items() if name != key}
 
 
-def _prediction(data: Mapping[str, Any], label: str) -> Prediction:
-    people = data["people"]
+def _prediction(data: Mapping[str, Any], whose: str = "") -> Prediction:
+    people, predictors = data["people"], tuple(_listed(data["predictors"], str, "predictors"))
     if not isinstance(people, Mapping):
-        raise SweepError(f"`people` of workspace {label!r} must be a table, got {shown(people)}")
+        raise SweepError(f"`people`{whose} must be a table, got {shown(people)}")
     if "participants" in people:
-        integer("participants", people["participants"], 1, 100_000, error=SweepError)
-    return Prediction(tuple(_listed(data["predictors"], str, "predictors")), dict(people))
+        integer(f"`participants` of `people`{whose}", people["participants"], 1, 100_000, error=SweepError)
+    if len(set(predictors)) < len(predictors):
+        raise SweepError(f"`predictors`{whose} has one more than once: {', '.join(predictors)}")
+    return Prediction(predictors, dict(people))
 
 
 def _name(value: Any) -> str:
@@ -240,7 +249,7 @@ def _seeds(value: Any) -> tuple[int, ...]:
     """That many seeds from 0, or those of a list."""
     if isinstance(value, list | tuple):
         return tuple(_integers(value, "seeds", 0))
-    return tuple(range(integer("seeds", value, 1, MOST, also="a list or", error=SweepError)))
+    return tuple(range(integer("seeds", value, 1, MOST, also="a list", error=SweepError)))
 
 
 def _integers(values: Any, what: str, low: int) -> list[int]:
