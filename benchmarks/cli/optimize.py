@@ -148,10 +148,10 @@ def _search_part(domain: str, part: Part, settings: Mapping[str, Any], out: Path
             raise EmitterError(f"{error} (--emitter-option NAME=VALUE sets an option)") from error
         raise
     except SearchInterrupted as stop:
-        _tell_stopped(domain, part, out, stop.partial)
+        _tell_stopped(domain, part, out, saved=True, found=stop.partial)
         raise click.exceptions.Exit(STOPPED) from None
     except KeyboardInterrupt:  # the second Ctrl-C, which does not wait for the end of a batch
-        _tell_stopped(domain, part, out, None)
+        _tell_stopped(domain, part, out, saved=is_run_folder(part.folder))
         raise click.exceptions.Exit(STOPPED) from None
     if result.best_genome is None:
         why = "" if settings["max_distance"] is None else "; is --max-distance too low?"
@@ -170,9 +170,8 @@ def _emitter_options(settings: Mapping[str, Any]) -> Any:
     return given
 
 
-def _tell_stopped(domain: str, part: Part, out: Path, found: SearchResult | None) -> None:
+def _tell_stopped(domain: str, part: Part, out: Path, *, saved: bool, found: SearchResult | None = None) -> None:
     """Say how to go on, then draw what was found, unless that is interrupted too."""
-    saved = is_run_folder(part.folder)
     after = "" if found is None else f" after {plural(found.evaluations, 'evaluation')}"
     click.echo(f"stopped{after}; {'everything is saved in' if saved else 'nothing was written to'} {out}", err=True)
     if saved:
