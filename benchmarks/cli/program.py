@@ -72,15 +72,21 @@ class Program(Commands):
             code = found if isinstance(found, int) else 0
             _flush()
         except click.ClickException as error:
-            if len(error.message) > _LONGEST:
-                error.message = f"{error.message[: _LONGEST // 2]} … {error.message[-_LONGEST // 2 :]}"
             code = error.exit_code
             with contextlib.suppress(AttributeError, OSError):  # there is no standard error to write to
-                error.show()
+                _shortened(error).show()
         except (click.Abort, KeyboardInterrupt):
             click.echo("stopped", err=True)
             code = STOPPED
         sys.exit(code)
+
+
+def _shortened(error: click.ClickException) -> click.ClickException:
+    """The error, without the middle of its message where that is very long."""
+    text = error.message
+    if len(text) <= _LONGEST:
+        return error
+    return _BadInput(f"{text[: _LONGEST // 2]} … {text[-_LONGEST // 2 :]}")
 
 
 @contextlib.contextmanager
