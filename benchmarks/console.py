@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+import os
 from collections.abc import Sequence
+from decimal import ROUND_HALF_UP, Context, Decimal
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -13,18 +16,21 @@ if TYPE_CHECKING:
     from legible_envs.overcooked.layout import OvercookedLayout
     from legible_envs.tabletop import TabletopLayout
 
-__all__ = ["kitchen_text", "number", "say", "table", "table_text"]
+__all__ = ["kitchen_text", "number", "plural", "say", "table", "table_text"]
 
 _PLAIN = {"X": "##", "V": "[]", " ": "  "}
 _FANCY = {"X": "▒▒", "V": "[]", " ": "  "}
 
 
 def say() -> Console:
-    """The console that commands print to: standard output, wide enough for panels when it is not a terminal."""
+    """The console that commands print to: standard output, wide enough for panels when it is not a terminal.
+
+    ``COLUMNS`` sets another width.
+    """
     from rich.console import Console
 
     console = Console(highlight=False, soft_wrap=False)
-    return console if console.is_terminal else Console(highlight=False, width=120)
+    return console if console.is_terminal or "COLUMNS" in os.environ else Console(highlight=False, width=120)
 
 
 def kitchen_text(console: Console, layout: OvercookedLayout) -> Text:
@@ -143,5 +149,36 @@ def _text(value: Any) -> str | RenderableType:
 
 
 def number(value: float | None, digits: int = 2) -> str:
-    """A number for reading, a dash where there is none."""
-    return "-" if value is None or value != value else f"{value:,.{digits}f}"
+    """A number for reading, a dash where there is none; the one rule by which numbers are rounded here.
+
+    The exact value is rounded once, halves away from zero, as the scripts of the reports do: whatever shows a number
+    must be given it unrounded, or two places may differ in the last digit. Zero has no sign.
+
+    Example:
+        >>> number(-25.17499), number(0.125), number(1234.5, 0), number(-0.001), number(None)
+        ('-25.17', '0.13', '1,235', '0.00', '-')
+    """
+    if value is None or math.isnan(value):
+        return "-"
+    if math.isinf(value):
+        return str(value)
+    exact = Decimal(float(value))
+    rounded = exact.quantize(Decimal(1).scaleb(-digits), ROUND_HALF_UP, _AS_LONG_AS_IT_TAKES)
+    return f"{rounded if rounded else abs(rounded):,f}"
+
+
+_AS_LONG_AS_IT_TAKES = Context(prec=800)
+
+
+def plural(count: int, noun: str) -> str:
+    """A number of things, with the noun in the singular or the plural.
+
+    Example:
+        >>> plural(1, "evaluation"), plural(2_000, "evaluation"), plural(0, "trajectory"), plural(2, "search")
+        ('1 evaluation', '2,000 evaluations', '0 trajectories', '2 searches')
+    """
+    if count == 1:
+        return f"1 {noun}"
+    if noun.endswith("y") and noun[-2] not in "aeiou":
+        return f"{count:,} {noun[:-1]}ies"
+    return f"{count:,} {noun}{'es' if noun.endswith(('s', 'x', 'ch', 'sh')) else 's'}"

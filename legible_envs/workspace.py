@@ -362,7 +362,8 @@ def workspace_class(name: str) -> type[Workspace]:
     """
     cls = _registry.resolve(name)
     if not (isinstance(cls, type) and issubclass(cls, Workspace)):
-        raise ValueError(f"workspace {name!r} is {cls!r}, which is not a subclass of Workspace")
+        kind = "a class" if isinstance(cls, type) else f"of type {type(cls).__name__}"
+        raise ValueError(f"workspace {name!r} is {kind}, which is not a subclass of Workspace")
     return cls
 
 

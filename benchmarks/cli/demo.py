@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from benchmarks.console import table
+from benchmarks.console import plural, table
 from benchmarks.presenters.base import Panel
 from benchmarks.presenters.overcooked import DOUBT, RANDOM_LAYOUTS, panels_text
 from benchmarks.reports.numbers import fixed
@@ -69,10 +69,10 @@ def run_demo(
         workspace.scores(
             workspace.perturb(workspace.sample(2, np.random.default_rng(seed)), 2, np.random.default_rng(0))
         )
-    console.print(f"Searching a legible {rows}x{columns} kitchen: {evaluations:,} layouts, exact scores")
+    console.print(f"Searching a legible {rows}x{columns} kitchen: {plural(evaluations, 'layout')}, exact scores")
     result = search(workspace, evaluations=evaluations, seed=seed, checkpoint=out, overwrite=True)
     if result.best_genome is None:
-        raise ValueError(f"no layout scored in {evaluations:,} evaluations; allow more")
+        raise ValueError(f"no layout scored in {plural(evaluations, 'evaluation')}; allow more")
     with _step(console, "Searching the efficient kitchen, drawing random ones"):
         found = make_panels(workspace, result.best_genome, seed=seed, evaluations=efficient_evaluations)
     with _step(console, "Predicting the goals of recorded participants"):
@@ -185,8 +185,8 @@ def _summed_up(scores: pd.DataFrame) -> dict[str, Any]:
     ]
     return {
         "note": (
-            f"{sum(row[1] for row in rows):,} recorded trajectories of real players (Carroll et al., NeurIPS 2019) in "
-            f"{len(kitchens)} kitchens that were not designed to be legible. Accuracy by share observed "
+            f"{plural(sum(row[1] for row in rows), 'recorded trajectory')} of real players (Carroll et al., NeurIPS 2019) "
+            f"in {plural(len(kitchens), 'kitchen')} that were not designed to be legible. Accuracy by share observed "
             f"(in {scores.attrs['cut']}), ties shared out; every dispenser in reach is a candidate. Neither predictor "
             "has learned anything from these players; chance is a guess among the candidates. The table averages over "
             f"{fractions[0]:.0%} to {fractions[-1]:.0%}."

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from benchmarks.cli.destinations import DestinationFolder
+
 if TYPE_CHECKING:
     import pandas as pd
     from rich.console import Console
@@ -22,7 +24,7 @@ __all__ = ["evaluate", "evaluate_predictors"]
 @click.option("--neural/--no-neural", default=None, help="Evaluate networks too. [default: where torch is installed]")
 @click.option("--layout", "layouts", multiple=True, metavar="NAME", help="Only this kitchen; repeatable.")
 @click.option("--repeats", type=click.IntRange(min=1), default=3, show_default=True, help="Of the cross-validation.")
-@click.option("--out", type=click.Path(file_okay=False, path_type=Path), help="Folder to write tables to.")
+@click.option("--out", type=DestinationFolder(), help="Folder to write tables to.")
 def evaluate(
     folder: Path | None,
     pointing: Path | None,
@@ -115,12 +117,12 @@ def _networks_wanted(neural: bool | None, notes: list[str]) -> bool:
 
 
 def _print(console: Console, name: str, scores: pd.DataFrame, out: Path | None) -> None:
-    from benchmarks.console import table
+    from benchmarks.console import plural, table
     from benchmarks.experiments.prediction.analysis import accuracy_table, reference_rows, to_markdown
 
     rows = reference_rows(scores)
     numbers = scores.groupby("layout", sort=False)["walks"].first()
-    counts = ", ".join(f"{layout} {count:,} trajectories" for layout, count in numbers.items())
+    counts = ", ".join(f"{layout} {plural(int(count), 'trajectory')}" for layout, count in numbers.items())
     about = f"fraction f observed means {scores.attrs['definition']}; ties {scores.attrs['ties']}"
     console.print(f"{name}: mean accuracy over 10..90 % (difference from before)", style="bold")
     console.print(table(rows))

@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from benchmarks.console import number, table
+from benchmarks.console import number, plural, table
 from benchmarks.presenters.losses import explains_stages, loss_row, losses_and_gains
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from benchmarks.reports.prediction_report import PredictionResults
     from legible_envs.rollouts.trajectory import Trajectory
 
-__all__ = ["print_predictions", "save_evaluation", "score_lines", "show_design", "trajectories_in"]
+__all__ = ["evaluation_folder", "print_predictions", "save_evaluation", "score_lines", "show_design", "trajectories_in"]
 
 WORST_ROWS, BEST_ROWS = 10, 3
 """Rows of the tables of losses and gains that the terminal shows."""
@@ -57,7 +57,7 @@ def _print_explanation(console: Console, design: Design) -> None:
     console.print(table([loss_row(row) for row in worst]))
     if rest := rows[len(worst) : len(rows) - len(best)]:
         total = math.fsum(row["contribution"] for row in rest)
-        console.print(f"and {len(rest)} more reaches, together {number(total)}", style="dim")
+        console.print(f"and {plural(len(rest), 'more reach')}, together {number(total)}", style="dim")
     if best:
         console.print("\nReaches that win most", style="bold")
         console.print(table([loss_row(row) for row in best]))
@@ -80,7 +80,9 @@ def print_predictions(console: Console, design: Design, file: Path) -> None:
         predictor.fit(recorded)
         scores = [predictor.score(recorded, fractions=(fraction,)) for fraction in fractions]
         rows.append({"predictor": name, **{f"{f:.0%}": s for f, s in zip(fractions, scores, strict=True)}})
-    console.print(f"\n{len(recorded):,} trajectories: goals predicted correctly, by share observed", style="bold")
+    console.print(
+        f"\n{plural(len(recorded), 'trajectory')}: goals predicted correctly, by share observed", style="bold"
+    )
     console.print(table(rows))
     console.print(f"definition: fraction f observed means {CUTS['steps']}; ties fractional", style="dim", markup=False)
 
@@ -101,6 +103,16 @@ def trajectories_in(design: Design, file: Path) -> list[Trajectory]:
     return recorded
 
 
+def evaluation_folder(layout: str, out: Path | None) -> Path | None:
+    """Where an evaluation is written: ``out``, or a folder within a run; None for neither."""
+    from benchmarks.reports.prediction_report import FOLDER
+    from optimizers import is_run_folder
+
+    if out is None and layout != "-" and is_run_folder(layout):
+        return Path(layout) / FOLDER
+    return out
+
+
 def save_evaluation(results: PredictionResults, layout: str, out: Path | None) -> list[str]:
     """Write results into ``out``, or into the folder and report of a run, and say where.
 
@@ -109,14 +121,12 @@ def save_evaluation(results: PredictionResults, layout: str, out: Path | None) -
         layout: The layout as the command line names it; may be a run's folder.
         out: The folder to write into; None takes the run's, and writes nothing without a run.
     """
-    from benchmarks.reports.prediction_report import FOLDER, write_evaluation
+    from benchmarks.reports.prediction_report import write_evaluation
     from benchmarks.reports.search_report import write_report
-    from optimizers import is_run_folder
 
-    is_run = layout != "-" and is_run_folder(layout)
-    if out is None and not is_run:
+    folder = evaluation_folder(layout, out)
+    if folder is None:
         return []
-    folder = out or Path(layout) / FOLDER
     write_evaluation(results, folder)
     lines = [f"tables, figures, page: {folder}"]
     if out is None:

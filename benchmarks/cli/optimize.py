@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 import shlex
 from collections.abc import Collection, Mapping
@@ -9,8 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+import numpy as np
 
-from benchmarks.console import number
+from benchmarks.cli.options import settings_from
+from benchmarks.cli.program import STOPPED
+from benchmarks.console import number, plural
 from benchmarks.presenters.base import Part, Presenter, summary_of
 from benchmarks.presenters.registry import presenter_of, presenter_of_run, usable_presenters
 from legible_envs.workspace import workspace_class
@@ -21,7 +25,15 @@ if TYPE_CHECKING:
     from legible_envs.support.plugins import Plugin
     from optimizers import SearchResult
 
-__all__ = ["check_options", "default_folder", "emitter_rows", "run_search", "workspace_rows", "write_pictures"]
+__all__ = [
+    "check_options",
+    "default_folder",
+    "emitter_rows",
+    "found_lines",
+    "run_search",
+    "workspace_rows",
+    "write_pictures",
+]
 
 
 def default_folder(domain: str, settings: Mapping[str, Any]) -> Path:
@@ -71,7 +83,10 @@ def run_search(domain: str, out: Path, settings: Mapping[str, Any], given: Colle
         if not _same_workspace(str(config.get("workspace")), domain):
             raise SearchError(f"{out} holds a search of {config.get('workspace')!r}, not of {domain!r}")
         settings = _continued(before, settings, given)
-    config |= presenter.design(settings) | dict(settings.get("assigned", ()))
+    assigned = settings_from(settings.get("assigned", ()), "--set")
+    if "workspace" in assigned:
+        raise click.UsageError("--set workspace does not apply: the workspace is the first argument")
+    config |= presenter.design(settings) | assigned
     parts = presenter.parts(config, settings, out)
     results = [_search_part(domain, part, settings, out) for part in parts]
     _tell(presenter, results[0], parts)
@@ -91,6 +106,7 @@ def _continued(before: Mapping[str, Any], settings: Mapping[str, Any], given: Co
         "objective": before["objective"]["name"],
         "max_distance": before["objective"].get("max_distance"),
         "emitter": [one["name"] for one in emitter] if isinstance(emitter, list) else emitter["name"],
+        "emitter_options": _options_before(emitter),
         "seed": before.get("seed", settings["seed"]),
     }
     if not {"evaluations", "iterations"} & set(given):
@@ -98,9 +114,16 @@ def _continued(before: Mapping[str, Any], settings: Mapping[str, Any], given: Co
     return {"evaluations": None, "iterations": None, **own, **kept}
 
 
+def _options_before(emitter: Any) -> Any:
+    """The options of the emitter, or of each of several, in a manifest."""
+    return (
+        [_options_before(one) for one in emitter] if isinstance(emitter, list) else dict(emitter.get("options") or {})
+    )
+
+
 def _search_part(domain: str, part: Part, settings: Mapping[str, Any], out: Path) -> SearchResult:
     """One search of one folder."""
-    from optimizers import SearchInterrupted, search
+    from optimizers import EmitterError, SearchInterrupted, search
 
     if part.title and not settings["quiet"]:
         click.echo(part.title, err=True)
@@ -111,6 +134,7 @@ def _search_part(domain: str, part: Part, settings: Mapping[str, Any], out: Path
             objective=settings["objective"],
             max_distance=settings["max_distance"],
             emitter=settings["emitter"],
+            emitter_options=_emitter_options(settings),
             evaluations=settings["evaluations"],
             iterations=None if iterations is None else (int(iterations[0]), int(iterations[1])),
             seed=settings["seed"],
@@ -119,19 +143,42 @@ def _search_part(domain: str, part: Part, settings: Mapping[str, Any], out: Path
             overwrite=settings["overwrite"],
             progress=False if settings["quiet"] else None,
         )
+    except EmitterError as error:
+        if re.search("missing|option|required", str(error)) and "--emitter-option" not in str(error):
+            raise EmitterError(f"{error} (--emitter-option NAME=VALUE sets an option)") from error
+        raise
     except SearchInterrupted as stop:
-        done = 0 if stop.partial is None else stop.partial.evaluations
-        click.echo(f"stopped after {done:,} evaluations; everything is saved in {out}", err=True)
-        if stop.partial is not None and stop.partial.best_genome is not None:
-            write_pictures(part.folder)
-        click.echo(f"to go on: legible optimize {domain} --resume --out {shlex.quote(str(out))}", err=True)
-        raise click.exceptions.Exit(130) from None
+        _tell_stopped(domain, part, out, saved=True, found=stop.partial)
+        raise click.exceptions.Exit(STOPPED) from None
+    except KeyboardInterrupt:  # the second Ctrl-C, which does not wait for the end of a batch
+        _tell_stopped(domain, part, out, saved=is_run_folder(part.folder))
+        raise click.exceptions.Exit(STOPPED) from None
     if result.best_genome is None:
-        click.echo(f"no layout scored in {result.evaluations:,} evaluations; is --max-distance too low?", err=True)
+        why = "" if settings["max_distance"] is None else "; is --max-distance too low?"
+        click.echo(f"no layout scored in {plural(result.evaluations, 'evaluation')}{why}", err=True)
         raise click.exceptions.Exit(1)
     if part.folder != out:
         write_pictures(part.folder)
     return result
+
+
+def _emitter_options(settings: Mapping[str, Any]) -> Any:
+    """What ``search`` takes: options given on the command line, or those of the search that is continued."""
+    given = settings.get("emitter_options", ())
+    if isinstance(given, tuple):
+        return settings_from(given, "--emitter-option") or None
+    return given
+
+
+def _tell_stopped(domain: str, part: Part, out: Path, *, saved: bool, found: SearchResult | None = None) -> None:
+    """Say how to go on, then draw what was found, unless that is interrupted too."""
+    after = "" if found is None else f" after {plural(found.evaluations, 'evaluation')}"
+    click.echo(f"stopped{after}; {'everything is saved in' if saved else 'nothing was written to'} {out}", err=True)
+    if saved:
+        click.echo(f"to go on: legible optimize {domain} --resume --out {shlex.quote(str(out))}", err=True)
+    if found is not None and found.best_genome is not None:
+        with contextlib.suppress(KeyboardInterrupt):
+            write_pictures(part.folder)
 
 
 def _tell(presenter: Presenter, result: SearchResult, parts: Collection[Part]) -> None:
@@ -142,17 +189,26 @@ def _tell(presenter: Presenter, result: SearchResult, parts: Collection[Part]) -
     written = write_pictures(result.folder)
     console = say()
     console.print(presenter.text(console, result.best_layout))
-    summary = summary_of(result.workspace, result.require_genome())
-    distance = f"{number(summary['distance'], 1)} {presenter.texts.distance_unit}".strip()
-    console.print(
-        f"{result.config['objective']['name']} {number(result.best_objective, 4)} "
-        f"(legibility {number(summary['score'])}, distance {distance}) "
-        f"after {result.evaluations:,} evaluations in {result.seconds:.1f} s"
-    )
+    for line in found_lines(result, presenter):
+        console.print(line, soft_wrap=True)
     for name, path in written.items():
         console.print(f"{name:<8}{path}", soft_wrap=True)
     if len(parts) > 1:
-        console.print(f"each of the {len(parts)} searches has a folder of its own there", style="dim")
+        console.print(f"each of the {plural(len(parts), 'search')} has a folder of its own there", style="dim")
+
+
+def found_lines(result: SearchResult, presenter: Presenter) -> list[str]:
+    """What a search found: the layout's score, and the objective where that is another number."""
+    genome, name = result.require_genome(), str(result.config["objective"]["name"])
+    summary = summary_of(result.workspace, genome)
+    penalty = float(np.ravel(result.workspace.penalty(np.asarray(genome)[None]))[0])
+    distance = f"{number(summary['distance'], presenter.texts.distance_digits)} {presenter.texts.distance_unit}".strip()
+    effort = f"after {plural(result.evaluations, 'evaluation')} in {result.seconds:.1f} s"
+    lines = [f"legibility {number(summary['score'])}, distance {distance}, {effort}"]
+    if name != "legibility" or penalty:
+        costs = f", net of costs of {number(penalty)} ({presenter.texts.costs})" if penalty else ""
+        lines.append(f"objective  {number(result.best_objective)}: {name}{costs}")
+    return lines
 
 
 def write_pictures(folder: Path) -> dict[str, Path]:

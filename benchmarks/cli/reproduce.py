@@ -10,6 +10,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from benchmarks.cli.destinations import check_folder
+from benchmarks.cli.options import out_folder, scheduler_option, workers_option
+from benchmarks.cli.program import STOPPED
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -109,9 +113,9 @@ def _run_part(module: str, folder: Path, how: Mapping[str, Any]) -> list[Section
 @click.argument("experiment", type=click.Choice(list(EXPERIMENTS)))
 @click.option("--quick", is_flag=True, help="A version of two minutes.")
 @click.option("--seeds", type=click.IntRange(min=1), help="Seeds, in place of the experiment's own number.")
-@click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Folder to write to.")
-@click.option("--workers", type=click.IntRange(min=1), help="Processes on this machine. [default: all cores]")
-@click.option("--scheduler", metavar="ADDRESS", help="Run on a Dask cluster, e.g. tcp://10.0.0.1:8786.")
+@out_folder
+@workers_option
+@scheduler_option
 @click.option("--quiet", is_flag=True, help="Show no progress.")
 def reproduce(
     experiment: str,
@@ -130,6 +134,7 @@ def reproduce(
     from benchmarks.trials.progress import TrialsProgress
 
     folder = out or Path("runs") / (f"{experiment}-quick" if quick else experiment)
+    check_folder(folder, "--out")
     try:
         with TrialsProgress(False if quiet else None) as progress:
             report = run_experiment(
@@ -143,7 +148,7 @@ def reproduce(
             )
     except KeyboardInterrupt:
         click.echo(f"stopped; finished trials are kept in {folder}; the same command continues from there", err=True)
-        raise click.exceptions.Exit(130) from None
+        raise click.exceptions.Exit(STOPPED) from None
     except TrialsFailed as error:
         raise click.ClickException(str(error)) from error
     _tell(folder)

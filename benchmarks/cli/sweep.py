@@ -6,14 +6,18 @@ from pathlib import Path
 
 import click
 
+from benchmarks.cli.destinations import check_folder
+from benchmarks.cli.options import out_folder, scheduler_option, workers_option
+from benchmarks.cli.program import STOPPED
+
 __all__ = ["sweep"]
 
 
 @click.command()
 @click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
-@click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Folder to write to.")
-@click.option("--workers", type=click.IntRange(min=1), help="Processes on this machine. [default: all cores]")
-@click.option("--scheduler", metavar="ADDRESS", help="Run on a Dask cluster, e.g. tcp://10.0.0.1:8786.")
+@out_folder
+@workers_option
+@scheduler_option
 @click.option("--quiet", is_flag=True, help="Show no progress.")
 def sweep(file: Path, out: Path | None, workers: int | None, scheduler: str | None, quiet: bool) -> None:
     """Run a grid of workspaces, objectives, emitters and seeds.
@@ -31,6 +35,7 @@ def sweep(file: Path, out: Path | None, workers: int | None, scheduler: str | No
 
     plan = Sweep.from_toml(file)
     folder = out or Path("runs") / plan.name
+    check_folder(folder, "--out")
     failed = None
     try:
         with TrialsProgress(False if quiet else None) as progress:
@@ -39,7 +44,7 @@ def sweep(file: Path, out: Path | None, workers: int | None, scheduler: str | No
         rows, failed = error.table, error
     except KeyboardInterrupt:
         click.echo(f"stopped; finished trials are kept in {folder}; the same command continues from there", err=True)
-        raise click.exceptions.Exit(130) from None
+        raise click.exceptions.Exit(STOPPED) from None
     if len(rows):
         say().print(table(for_reading(rows)))
     click.echo(f"results {folder / 'results.csv'}\nsummary {folder / 'summary.csv'}")

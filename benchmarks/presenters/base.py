@@ -92,6 +92,7 @@ class ReportTexts:
         distance_digits: Decimals of a distance.
         made: Over what the legibility (Eq. 2 and 3) is averaged; empty where it is not that of the equations.
         measured: How the distance is measured.
+        costs: What an objective may lose to, beside what it is named after.
     """
 
     axes: Mapping[str, str] = field(default_factory=dict)
@@ -103,6 +104,7 @@ class ReportTexts:
     distance_digits: int = 2
     made: str = ""
     measured: str = ""
+    costs: str = "the workspace's penalty"
 
 
 @dataclass(frozen=True)

@@ -174,6 +174,7 @@ class KitchenPresenter(Presenter):
         distance_digits=1,
         made="over all shortest paths, prefixes and valid orders of the task",
         measured="the expected number of floor moves of the whole task",
+        costs="moved stations",
     )
 
     def recognises(self, text: str, source: str) -> bool:

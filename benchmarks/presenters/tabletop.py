@@ -244,6 +244,7 @@ class TablePresenter(Presenter):
         distance_digits=2,
         made="over observed shares of all shortest reaches and all valid orders of the task",
         measured="the expected length, in metres, of all paths of the hand in one task, fetching and carrying",
+        costs="virtual obstacles",
     )
 
     def recognises(self, text: str, source: str) -> bool:

@@ -139,11 +139,13 @@ def _compare(
 
 def print_evaluation(console: Console, results: PredictionResults) -> None:
     """Print the figures of merit, accuracy against fraction observed, comparisons, and what they mean."""
-    from benchmarks.console import table
+    from benchmarks.console import plural, table
 
     found = results.evaluation
     number = found.table["trajectory"].nunique()
-    console.print(f"\n{number:,} trajectories: prediction of their goals, mean over fractions observed", style="bold")
+    console.print(
+        f"\n{plural(number, 'trajectory')}: prediction of their goals, mean over fractions observed", style="bold"
+    )
     console.print(table(_summary_rows(found)))
     console.print("Accuracy by fraction observed", style="bold")
     console.print(table(_accuracy_rows(found)))

@@ -238,7 +238,7 @@ def _explained(rows: Sequence[Mapping[str, Any]]) -> list[tuple[str, list[dict[s
 
 
 def _plain(value: Any) -> Any:
-    """The same in types that JSON has; numbers to eight digits, so that pages round what is hardly rounded."""
+    """The same in types that JSON has; numbers to nine digits, NaN and infinities as null."""
     if isinstance(value, np.ndarray):
         return _plain(value.tolist())
     if isinstance(value, Mapping):

@@ -3,21 +3,30 @@
 from __future__ import annotations
 
 import itertools
+import math
 import tomllib
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import date, datetime, time
+from difflib import get_close_matches
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final, NamedTuple, get_args
 
 import numpy as np
 
+from legible_envs.support.text import read_text
+from legible_envs.support.validation import choice, integer, shown
 from legible_envs.workspace import ObjectiveName, Workspace, make_workspace
 from predictors.registry import make_predictor
 
 __all__ = ["Named", "Prediction", "Sweep", "SweepError", "Variant"]
 
 _KEYS: Final = ("name", "seeds", "evaluations", "objectives", "workspaces", "emitters", "predictors", "people")
+
+MOST: Final = 1_000_000
+"""Searches of a sweep."""
 
 
 class SweepError(ValueError):
@@ -85,8 +94,10 @@ class Sweep:
         """
         path = Path(path)
         try:
-            data = tomllib.loads(path.read_text(encoding="utf-8"))
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            data = tomllib.loads(read_text(path))
+        except RecursionError as error:
+            raise SweepError(f"{path} is not TOML that can be read: it is nested too deeply") from error
+        except ValueError as error:
             raise SweepError(f"{path} is not TOML: {error}") from error
         try:
             return cls.from_dict({"name": path.stem} | data)
@@ -110,21 +121,27 @@ class Sweep:
         unknown = sorted(set(data) - set(_KEYS))
         if unknown or not data.get("workspaces"):
             raise SweepError(
-                f"a sweep needs `workspaces` and knows the keys {list(_KEYS)}"
-                + (f"; unknown: {unknown}" if unknown else "; `workspaces` is missing or empty")
+                f"a sweep needs `workspaces` and knows the keys {', '.join(_KEYS)}; "
+                + (f"unknown: {', '.join(map(_meant, unknown))}" if unknown else "`workspaces` is missing or empty")
             )
-        seeds = data.get("seeds", 1)
+        for key, value in data.items():
+            _refuse_dates_and_infinities(key, value)
         workspaces = _axis(data["workspaces"], "workspace", own=("predictors", "people"))
         shared = {"predictors": data.get("predictors", []), "people": data.get("people", {})}
         sweep = cls(
-            name=str(data.get("name", "sweep")),
+            name=_name(data.get("name", "sweep")),
             workspaces=workspaces,
             emitters=_axis(data.get("emitters", ["improve"]), "emitter"),
             objectives=tuple(_listed(data.get("objectives", ["legibility"]), str, "objectives")),
-            evaluations=tuple(_listed(data.get("evaluations", [100_000]), int, "evaluations")),
-            seeds=tuple(range(seeds)) if type(seeds) is int else tuple(_listed(seeds, int, "seeds")),
-            prediction={named.label: _prediction(shared | dict(named.own)) for named in workspaces},
+            evaluations=tuple(_integers(data.get("evaluations", [100_000]), "evaluations", 1)),
+            seeds=_seeds(data.get("seeds", 1)),
+            prediction={
+                named.label: _prediction(shared | dict(named.own), f" of workspace {named.label!r}")
+                for named in workspaces
+            },
         )
+        for name in _prediction(shared).predictors:  # also where every workspace has its own
+            _try(f"predictor {name!r}", lambda name=name: make_predictor(name))
         sweep._check()
         return sweep
 
@@ -157,23 +174,29 @@ class Sweep:
         for what, values in (("objectives", self.objectives), ("evaluations", self.evaluations), ("seeds", self.seeds)):
             if not values:
                 raise SweepError(f"`{what}` is empty; nothing would be run")
-        unknown = [name for name in self.objectives if name not in get_args(ObjectiveName)]
-        if unknown:
-            raise SweepError(f"unknown objectives {unknown}; there are {list(get_args(ObjectiveName))}")
-        if min(self.evaluations) < 1:
-            raise SweepError(f"`evaluations` must be at least 1, got {min(self.evaluations)}")
+            if len(set(values)) < len(values):
+                twice = next(value for value, count in Counter(values).items() if count > 1)
+                raise SweepError(f"`{what}` has {twice!r} more than once")
+        for name in self.objectives:
+            choice("objectives", name, get_args(ObjectiveName), error=SweepError)
+        axes = (self.workspaces, self.objectives, self.emitters, self.evaluations, self.seeds)
+        if (count := math.prod(map(len, axes))) > MOST:
+            raise SweepError(f"that makes {count:,} searches; a sweep has at most {MOST:,}")
         for named in self.workspaces:
-            try:
-                workspace = make_workspace(named.settings)
-                for emitter in self.emitters:
-                    _try(
-                        f"emitter {emitter.label!r}",
-                        lambda w=workspace, o=emitter.settings: make_emitter(
-                            o["emitter"], make_archive(w, seed=0), w, seed=0, options=_without(o, "emitter")
-                        ),
-                    )
-            except (ValueError, TypeError) as error:
-                raise SweepError(f"workspace {named.label!r}: {error}") from error
+            about = f"workspace {named.label!r}"
+            workspace = _try(about, lambda named=named: make_workspace(named.settings))
+            for emitter in self.emitters:
+                _try(
+                    f"{about}: emitter {emitter.label!r}",
+                    lambda w=workspace, o=emitter.settings: make_emitter(
+                        o["emitter"],
+                        make_archive(w, seed=0),
+                        w,
+                        seed=0,
+                        evaluations=min(self.evaluations),
+                        options=_without(o, "emitter"),
+                    ),
+                )
             self._check_prediction(named.label, workspace)
 
     def _check_prediction(self, label: str, workspace: Workspace) -> None:
@@ -195,34 +218,86 @@ class Sweep:
 def _try(what: str, make: Any) -> Any:
     try:
         return make()
-    except (ValueError, TypeError, RuntimeError, ImportError) as error:
-        raise SweepError(f"{what}: {error}") from error
+    except Exception as error:  # whatever settings of a file may do to a plug-in
+        kind = "" if isinstance(error, ValueError | RuntimeError) else f"{type(error).__name__}: "
+        raise SweepError(f"{what}: {kind}{error}") from error
 
 
 def _without(settings: Mapping[str, Any], key: str) -> dict[str, Any]:
     return {name: value for name, value in settings.items() if name != key}
 
 
-def _prediction(data: Mapping[str, Any]) -> Prediction:
-    if not isinstance(data["people"], Mapping):
-        raise SweepError(f"`people` must be a table, got {data['people']!r}")
-    return Prediction(tuple(_listed(data["predictors"], str, "predictors")), dict(data["people"]))
+def _prediction(data: Mapping[str, Any], whose: str = "") -> Prediction:
+    people, predictors = data["people"], tuple(_listed(data["predictors"], str, "predictors"))
+    if not isinstance(people, Mapping):
+        raise SweepError(f"`people`{whose} must be a table, got {shown(people)}")
+    if "participants" in people:
+        integer(f"`participants` of `people`{whose}", people["participants"], 1, 100_000, error=SweepError)
+    if len(set(predictors)) < len(predictors):
+        raise SweepError(f"`predictors`{whose} has one more than once: {', '.join(predictors)}")
+    return Prediction(predictors, dict(people))
+
+
+def _name(value: Any) -> str:
+    """The name of a sweep, which names its folder, too."""
+    if not isinstance(value, str) or not value.strip() or value.strip(". ") == "" or set(value) & set("/\\:\0\n"):
+        raise SweepError(f"`name` must be a text without / \\ : or line breaks, got {shown(value)}")
+    return value
+
+
+def _seeds(value: Any) -> tuple[int, ...]:
+    """That many seeds from 0, or those of a list."""
+    if isinstance(value, list | tuple):
+        return tuple(_integers(value, "seeds", 0))
+    return tuple(range(integer("seeds", value, 1, MOST, also="a list", error=SweepError)))
+
+
+def _integers(values: Any, what: str, low: int) -> list[int]:
+    return [
+        integer(what, value, low, error=SweepError)
+        for value in (values if isinstance(values, list | tuple) else [values])
+    ]
+
+
+def _meant(key: str) -> str:
+    near = get_close_matches(key, _KEYS, 1)
+    return f"{key!r}" + (f" (did you mean `{near[0]}`?)" if near else "")
+
+
+def _refuse_dates_and_infinities(where: str, value: Any) -> None:
+    """Refuse what trials, which are JSON, cannot hold; says where it stands.
+
+    Raises:
+        SweepError: There is such a value.
+    """
+    if isinstance(value, Mapping):
+        for key, inner in value.items():
+            _refuse_dates_and_infinities(f"{where}.{key}", inner)
+    elif isinstance(value, list | tuple):
+        for number, inner in enumerate(value, 1):
+            _refuse_dates_and_infinities(f"{where}[{number}]", inner)
+    elif isinstance(value, float) and not math.isfinite(value):
+        raise SweepError(f"`{where}` must be finite, got {value}")
+    elif isinstance(value, date | datetime | time):
+        raise SweepError(f"`{where}` must be a text, number, truth value, list or table, got the date or time {value}")
 
 
 def _axis(entries: Any, key: str, own: Sequence[str] = ()) -> tuple[Named, ...]:
     """Entries of an axis: names or mappings, labelled so that tables can tell them apart; ``own`` are no settings."""
     found = []
     if not isinstance(entries, str | Mapping | list | tuple):
-        raise SweepError(f"`{key}s` must be a name, a table or a list of these, got {entries!r}")
+        raise SweepError(f"`{key}s` must be a name, a table or a list of these, got {shown(entries)}")
     for number, entry in enumerate([entries] if isinstance(entries, str | Mapping) else entries, 1):
         settings = {key: entry} if isinstance(entry, str) else dict(entry) if isinstance(entry, Mapping) else {}
         if not isinstance(settings.get(key), str):
             raise SweepError(
-                f"entry {number} of `{key}s` must be a name or a table with the key `{key}`, got {entry!r}"
+                f"entry {number} of `{key}s` must be a name or a table with the key `{key}`, got {shown(entry)}"
             )
         label = settings.pop("label", None)
+        if label is not None and not (isinstance(label, str) and label.strip()):
+            raise SweepError(f"`label` of entry {number} of `{key}s` must be a text, got {shown(label)}")
         apart = {name: settings.pop(name) for name in own if name in settings}
-        found.append(Named(str(label) if label is not None else _label(settings, key), settings, apart))
+        found.append(Named(label if label is not None else _label(settings, key), settings, apart))
     labels = [name.label for name in found]
     repeated = sorted({label for label in labels if labels.count(label) > 1})
     if repeated or not found:
@@ -244,5 +319,5 @@ def _listed(values: Any, kind: type, what: str) -> Sequence[Any]:
     values = values if isinstance(values, list | tuple) else [values]
     wrong = [value for value in values if type(value) is not kind]
     if wrong:
-        raise SweepError(f"`{what}` must hold {'texts' if kind is str else 'integers'}, got {wrong[0]!r}")
+        raise SweepError(f"`{what}` must hold {'texts' if kind is str else 'integers'}, got {shown(wrong[0])}")
     return values

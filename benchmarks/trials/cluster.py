@@ -8,7 +8,7 @@ from typing import Any
 
 from benchmarks.trials.attempts import Outcome, run_one
 from benchmarks.trials.store import Trial
-from optimizers.evaluator import connect
+from optimizers.cluster import WORKERS, connect, wait_for_workers
 
 __all__ = ["ClusterPool"]
 
@@ -30,20 +30,31 @@ class ClusterPool:
 
     Args:
         scheduler: Its address.
+        patience: Seconds to wait for the first worker, and for another one where all were lost.
+
+    Raises:
+        ConnectionError: No scheduler answers at the address.
     """
 
-    def __init__(self, scheduler: str) -> None:
+    def __init__(self, scheduler: str, patience: float = WORKERS) -> None:
+        self._scheduler = scheduler
+        self._patience = patience
         self._client = connect(scheduler)
         self._queue: deque[tuple[int, Trial]] = deque()
 
     def run(self, function: str, trials: Iterator[tuple[int, Trial]]) -> Iterator[Outcome | dict[str, Trial]]:
-        """Outcomes in any order; between them, mappings of worker to trial whenever that changes."""
+        """Outcomes in any order; between them, mappings of worker to trial whenever that changes.
+
+        Raises:
+            ConnectionError: The scheduler is without workers for longer than ``patience``.
+        """
         from distributed import wait
 
         self._queue.extend(trials)
         running: dict[Any, tuple[int, Trial]] = {}
         try:
             while self._queue or running:
+                wait_for_workers(self._client, self._scheduler, self._patience)
                 self._submit(function, running)
                 try:
                     with self._client.as_current():

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing
 import os
+import signal
 from collections import deque
 from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -63,7 +65,8 @@ class LocalPool:
                 idle = [name for name in self._executors if name not in {worker for worker, _, _ in running.values()}]
                 while idle and self._queue:
                     worker, (number, trial) = idle.pop(0), self._queue.popleft()
-                    future = self._executors[worker].submit(run_one, function, number, trial, worker)
+                    with _deaf_to_interrupts():
+                        future = self._executors[worker].submit(run_one, function, number, trial, worker)
                     running[future] = (worker, number, trial)
                 yield {worker: trial for worker, _, trial in running.values()}
                 if not running:
@@ -93,6 +96,22 @@ class LocalPool:
             executor.shutdown(wait=False, cancel_futures=True)
             for process in processes:
                 process.terminate()
+
+
+@contextlib.contextmanager
+def _deaf_to_interrupts() -> Iterator[None]:
+    """Processes started meanwhile do not hear Ctrl-C, which a terminal sends to all: this process ends them.
+
+    They would print a traceback each. This process hears what came meanwhile afterwards.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _executor() -> ProcessPoolExecutor:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from benchmarks.console import plural
 from benchmarks.trials.attempts import Outcome, Pool
 from benchmarks.trials.functions import name_of, path_of
 from benchmarks.trials.store import Trial, TrialStore
@@ -106,8 +107,8 @@ def run_trials(
     if event.failed:
         last = failures[-1]["traceback"].strip().splitlines()[-1]
         raise TrialsFailed(
-            f"{event.failed} of {event.total} trials failed {ATTEMPTS} times; the others are finished. Tracebacks: "
-            f"{store.folder / 'failed'}. The last: {last}",
+            f"{event.failed} of {plural(event.total, 'trial')} failed {ATTEMPTS} times; the others are finished. "
+            f"Tracebacks: {store.folder / 'failed'}. The last: {last}",
             failures,
             table,
         )

@@ -15,6 +15,7 @@ import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
+from legible_envs.drawing.window import open_screen, room_for_a_window
 from legible_envs.overcooked.game.vectors import INTERACT, STAY
 from legible_envs.overcooked.layout import INGREDIENTS, OvercookedLayout
 from legible_envs.overcooked.recipes import PAPER_SOUPS, Recipe, check_recipes
@@ -24,12 +25,13 @@ from legible_envs.support.validation import real
 if TYPE_CHECKING:
     from legible_envs.rollouts.trajectory import Trajectory
 
-__all__ = ["Played", "load_played", "play", "read_played", "recipes_for", "trajectories_from_played"]
+__all__ = ["Played", "load_played", "play", "read_played", "recipes_for", "tile_for", "trajectories_from_played"]
 
 ENV_ID: Final = "LegibleOvercooked-v0"
 _POLLS_PER_SECOND: Final = 60
 _QUEUE: Final = 2  # more taps than this ahead of the game would make it feel slow to answer
 _SCHEMA: Final = 1
+_LEAST_TILE, _LARGEST_TILE = 8, 160  # pixels of a cell's side
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +46,7 @@ class Played:
         actions: ``(T,)`` int8, the action of every step.
         episodes: ``(T,)`` int32, which game the step belongs to, from 0.
         rewards: ``(T,)`` float64.
+        interrupted: Whether Ctrl-C ended them; not written to the file.
     """
 
     layout: OvercookedLayout
@@ -53,6 +56,7 @@ class Played:
     actions: npt.NDArray[np.int8] = field(default_factory=lambda: np.zeros(0, np.int8))
     episodes: npt.NDArray[np.int32] = field(default_factory=lambda: np.zeros(0, np.int32))
     rewards: npt.NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    interrupted: bool = False
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write an ``.npz`` that :func:`load_played` reads; the name is used as given.
@@ -192,7 +196,7 @@ def play(
             interrupted; not written if no step was played.
         virtual_obstacles: ``"hard"`` or ``"soft"`` (can be crossed, crossings are counted).
         seed: Seed of the first game.
-        zoom: Enlargement of the picture.
+        zoom: Enlargement of the environment's picture; None draws cells as large as the screen has room for.
 
     Returns:
         What was played.
@@ -214,10 +218,11 @@ def play(
         _check_writable(Path(record))
     env = setting.make_env("rgb_array")
     steps: list[tuple[int, int, float]] = []
+    interrupted = False
     try:
         _PlayWindow(env, fps, zoom, seed, steps).run()
     except KeyboardInterrupt:
-        pass  # a way to end like any other
+        interrupted = True  # a way to end like any other
     finally:
         env.close()
         actions, episodes, rewards = zip(*steps, strict=True) if steps else ((), (), ())
@@ -229,6 +234,7 @@ def play(
             np.array(actions, np.int8),
             np.array(episodes, np.int32),
             np.array(rewards, np.float64),
+            interrupted,
         )
         if record is not None and steps:  # an earlier recording is not replaced by nothing
             played.save(record)
@@ -242,6 +248,34 @@ def _check_writable(path: Path) -> None:
         raise IsADirectoryError(f"{path} is a folder; name a file to record to")
     if not os.access(path.parent, os.W_OK):
         raise PermissionError(f"cannot write to the folder {path.parent}")
+
+
+class _Enlarged(gym.Wrapper[Any, Any, Any, Any]):
+    """A kitchen drawn with cells of another size, sharp at any."""
+
+    def __init__(self, env: gym.Env[Any, Any], tile: int) -> None:
+        super().__init__(env)
+        self._tile = tile
+
+    def render(self) -> Any:
+        from legible_envs.overcooked.rendering import draw_game
+
+        return draw_game(self.env.get_wrapper_attr("view")(), tile=self._tile)
+
+
+def tile_for(shape: tuple[int, int], room: tuple[int, int]) -> int:
+    """Pixels of a cell's side, so that a game fills the screen: a multiple of 8 up to 160; sprites are sharp at any.
+
+    Args:
+        shape: Rows and columns of the kitchen.
+        room: Width and height for the picture with the strip of orders.
+    """
+    from legible_envs.overcooked.rendering import hud_height
+
+    def fits(tile: int) -> bool:
+        return shape[1] * tile <= room[0] and shape[0] * tile + hud_height(tile) <= room[1]
+
+    return max(filter(fits, range(_LEAST_TILE, _LARGEST_TILE + 1, _LEAST_TILE)), default=_LEAST_TILE)
 
 
 class _PlayWindow:
@@ -268,11 +302,13 @@ class _PlayWindow:
         self._taps: deque[int] = deque(maxlen=_QUEUE)
         self._held: list[int] = []
         env.reset(seed=seed)
+        open_screen()
+        if zoom is None:
+            self._env = env = _Enlarged(env, tile_for(env.get_wrapper_attr("layout").shape, room_for_a_window()))
         try:
-            self._pygame.display.init()
             self._game = gym_play.PlayableGame(env, {(key,): action for key, action in self._keys.items()}, zoom)
         except self._pygame.error as error:
-            raise RuntimeError(f"cannot open a window to play in: {error}") from error
+            raise RuntimeError(f"cannot open a window: {error}") from error
         self._pygame.display.set_caption("Legible kitchen")
 
     def run(self) -> None:
@@ -283,7 +319,8 @@ class _PlayWindow:
             while self._game.running:
                 delivered, steps = self._play_one(episode)
                 if self._game.running:
-                    self._wait(f"{delivered} soups in {steps} steps", "Any key: play again", "Esc: end")
+                    soups = "1 soup" if delivered == 1 else f"{delivered} soups"
+                    self._wait(f"{soups} in {steps} steps", "Any key: play again", "Esc: end")
                     self._env.reset()
                     episode += 1
         finally:
@@ -345,6 +382,6 @@ class _PlayWindow:
 
         picture: Any = self._env.render()
         if lines:
-            picture = overlay(picture, lines, 48)
+            picture = overlay(picture, lines, max(48, picture.shape[1] // 8))
         self._show(self._game.screen, picture, transpose=True, video_size=self._game.video_size)
         self._pygame.display.flip()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from difflib import get_close_matches
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
@@ -106,8 +107,10 @@ class Registry:
             installed = self._installed().get(spec)
             target = installed.value if installed else spec
         if ":" not in target:
-            known = ", ".join(sorted(self.list()))
-            raise self.error(f"no {self.kind} named {spec!r}; known: {known}; or use 'module:Class'")
+            known = sorted(self.list())
+            near = get_close_matches(spec, known, 1)
+            meant = f"did you mean {near[0]!r}? " if near else ""
+            raise self.error(f"no {self.kind} named {spec!r}; {meant}known: {', '.join(known)}; or use 'module:Class'")
         try:
             found = import_target(target)
         except (ImportError, AttributeError, ValueError) as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import shutil
 import subprocess
@@ -14,6 +15,8 @@ import numpy as np
 import pytest
 
 from benchmarks.cli.app import CONTENTS, main
+from benchmarks.cli.options import typed_value
+from benchmarks.console import number, plural
 from benchmarks.presenters.overcooked import load_kitchen
 from legible_envs import __version__
 from legible_envs.overcooked import OvercookedLayout, OvercookedWorkspace
@@ -154,10 +157,12 @@ def test_efficiency_and_a_distance_cap(tmp_path: Path) -> None:
     capped = legible("optimize", "overcooked", "--out", tmp_path / "a", *small, "--max-distance", 60)
     assert capped.exit_code == 0, capped.output
     assert float(values(legible("score", tmp_path / "a"))["distance"]) <= 60
-    with pytest.warns(UserWarning, match="max_distance"):
-        impossible = legible("optimize", "overcooked", "--out", tmp_path / "b", *small, "--max-distance", 1)
+    impossible = legible("optimize", "overcooked", "--out", tmp_path / "b", *small, "--max-distance", 1)
     assert impossible.exit_code == 1
-    assert "--max-distance" in impossible.output
+    warned, ended = impossible.output.splitlines()
+    assert warned.startswith("Warning: none of ")
+    assert ended.startswith("no layout scored in ")
+    assert ended.endswith("is --max-distance too low?")
 
 
 def test_ctrl_c_says_how_to_go_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -171,6 +176,78 @@ def test_ctrl_c_says_how_to_go_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert result.exit_code == 130
     assert "--resume --out " in result.output
     assert "my run'" in result.output, "the folder is quoted for the shell"
+
+
+def test_a_second_ctrl_c_stops_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import optimizers
+
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(optimizers, "search", interrupted, raising=False)
+    result = legible("optimize", "overcooked", "--out", tmp_path / "run")
+    assert result.exit_code == 130
+    assert result.output.startswith("stopped; nothing was written to ")
+    assert "Aborted" not in result.output
+
+
+def test_options_of_an_emitter_reach_it_and_are_kept(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    start = ("optimize", "overcooked", "--shape", 5, 5, "--quiet", "--out", out)
+    options = ("--emitter", "ribs.emitters:GaussianEmitter", "--emitter-option", "sigma=0.5",
+               "--emitter-option", "batch_size=32")  # fmt: skip
+    first = legible(*start, *options, "--evaluations", 1500)
+    assert first.exit_code == 0, first.output
+    kept = json.loads((out / "config.json").read_text())["emitter"]
+    assert kept["options"] == {"sigma": 0.5, "batch_size": 32}
+    again = legible("optimize", "overcooked", "--resume", "--evaluations", 2500, "--quiet", "--out", out)
+    assert again.exit_code == 0, again.output
+    other = legible("optimize", "overcooked", "--resume", "--emitter-option", "sigma=2.0", "--quiet", "--out", out)
+    assert other.exit_code == 2
+    assert "emitter" in other.output
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("0.5", 0.5), ("7", 7), ("true", True), ("sum", "sum"), ("'7'", "7"), ('"7"', "7"), ("[7, 7]", [7, 7]),
+        ("{a = 1}", {"a": 1}), ('{"a": 1}', {"a": 1}), ("null", None), ("1_000", 1000), ("inf", math.inf),
+        ("2020-01-01", "2020-01-01"), ("[2020-01-01]", "[2020-01-01]"), ("", ""), ("a=b", "a=b"),
+        ("1\nb = 2", "1\nb = 2"), ("[" * 10_000, "[" * 10_000), ("9" * 5000, "9" * 5000),
+    ],
+)  # fmt: skip
+def test_values_are_typed_as_in_the_file_of_a_sweep(text: str, value: object) -> None:
+    assert typed_value(text) == value
+    assert type(typed_value(text)) is type(value)
+
+
+def test_numbers_are_rounded_by_one_rule_as_the_pages_do() -> None:
+    """Halves away from zero, from the exact value, once; ``toFixed`` of the reports' script does the same."""
+    assert [number(x) for x in (-25.17499, -25.175, 0.125, -0.125, 2.675, 1.005)] == [
+        "-25.17", "-25.18", "0.13", "-0.13", "2.67", "1.00"]  # fmt: skip
+    assert [number(x, 0) for x in (0.5, 1.5, 2.5, 1234567.5, -0.4)] == ["1", "2", "3", "1,234,568", "0"]
+    assert [number(x) for x in (None, math.nan, math.inf, 1e300)][:3] == ["-", "-", "inf"]
+    rng = np.random.default_rng(0)
+    for value in rng.normal(0, 30, 2000):
+        assert abs(float(number(value, 3).replace(",", "")) - value) <= 0.0005 + 1e-12
+
+
+def test_what_the_console_shows_is_what_the_page_shows(run: Path) -> None:
+    """The page rounds what it is given once more: it must be given nearly all of it."""
+    from benchmarks.reports.search_report import _plain
+
+    rng = np.random.default_rng(1)
+    for value in [-25.17499, 12.34499, *rng.normal(0, 30, 2000)]:
+        assert number(_plain(float(value))) == number(float(value))
+
+
+@pytest.mark.parametrize(
+    ("count", "noun", "text"),
+    [(1, "evaluation", "1 evaluation"), (0, "trial", "0 trials"), (2000, "trajectory", "2,000 trajectories"),
+     (2, "search", "2 searches"), (2, "day", "2 days")],
+)  # fmt: skip
+def test_counts_are_in_the_right_number(count: int, noun: str, text: str) -> None:
+    assert plural(count, noun) == text
 
 
 def test_report_is_written_anew(run: Path) -> None:
@@ -204,7 +281,7 @@ def test_emitters_are_listed() -> None:
         (("optimize", "overcooked", "--emitter", "nobody"), None, "nobody"),
         (("optimize", "overcooked", "--emitter", "json:nobody"), None, "nobody"),
         (("optimize", "overcooked", "--prefix", "most"), None, "most"),
-        (("optimize", "overcooked", "--max-distance", "-3"), None, "max_distance"),
+        (("optimize", "overcooked", "--max-distance", "-3"), None, "--max-distance"),
         (("optimize", "overcooked", "--resume", "--out", "nowhere"), None, "nowhere"),
         (("optimize", "kitchenette"), None, "kitchenette"),
         (("report", "."), None, "config.json"),

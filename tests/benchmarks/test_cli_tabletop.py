@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from benchmarks.console import number
 from benchmarks.presenters.tabletop_panels import CONDITIONS, panels_of
 from legible_envs.tabletop import TabletopLayout, TabletopTask, VirtualObstacle
 from legible_envs.tabletop.design.workspace import TabletopWorkspace
@@ -97,6 +98,22 @@ def test_the_report_shows_map_panels_and_reaches(run: Path) -> None:
     obstacles = page_data(run / "obstacles")["axes"]
     assert obstacles[0]["labels"] == ["0", "1", "2", "3", "4"][: obstacles[0]["count"]]
     assert obstacles[1]["labels"][:2] == ["1.00", "1.01"]
+
+
+def test_score_and_objective_are_told_apart(run: Path) -> None:
+    from benchmarks.cli.optimize import found_lines
+    from benchmarks.presenters.registry import presenter_of
+
+    result = load_run(run)
+    genome, workspace = result.require_genome(), result.workspace
+    lines = found_lines(result, presenter_of("tabletop"))
+    legibility, costs = workspace.legibility(genome), float(workspace.penalty(genome[None])[0])
+    assert costs > 0, "this search found obstacles"
+    assert lines[0].startswith(f"legibility {number(legibility)}, distance ")
+    assert lines[1] == (
+        f"objective  {number(result.best_objective)}: legibility, net of costs of {number(costs)} (virtual obstacles)"
+    )
+    assert result.best_objective == pytest.approx(legibility - costs)
 
 
 def test_report_is_written_anew(run: Path) -> None:

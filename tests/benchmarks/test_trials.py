@@ -18,7 +18,7 @@ import pytest
 from benchmarks.trials import Event, TrialName, TrialsFailed, TrialStore, run_trials
 from legible_envs.overcooked import OvercookedWorkspace
 from optimizers import search
-from optimizers.evaluator import connect
+from optimizers.cluster import connect
 from tests.benchmarks import trial_functions
 
 TRIALS = [{"seed": seed, "settings": {"size": 3}, "shape": [7, 7]} for seed in range(5)]

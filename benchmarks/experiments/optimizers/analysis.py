@@ -123,7 +123,13 @@ def pairwise(ends: pd.DataFrame) -> pd.DataFrame:
                 # Scores that differ in the last bits only are the same score.
                 x, y = (part.loc[part["method"] == name, "best"].round(9).to_numpy() for name in (a, b))
                 test = mannwhitneyu(x, y, alternative="two-sided")
-                row = {"grid": grid, "budget": budget, "a": a, "b": b, "difference": float(x.mean() - y.mean())}
+                row = {
+                    "grid": grid,
+                    "budget": budget,
+                    "a": a,
+                    "b": b,
+                    "difference": _zero_or(float(x.mean() - y.mean())),
+                }
                 row |= {"superiority": float(test.statistic / (len(x) * len(y))), "hedges_g": hedges_g(x, y)}
                 rows.append({**row, "p": float(test.pvalue)})
         if rows:
@@ -167,12 +173,16 @@ def leaderboard(best: pd.DataFrame) -> pd.DataFrame:
     )
 
 
+def _zero_or(difference: float) -> float:
+    """A difference of scores; sums of the same terms in another order differ in the last bits: that is none."""
+    return 0.0 if abs(difference) <= _REACHED else difference
+
+
 def gaps(ends: pd.DataFrame) -> pd.DataFrame:
     """How far each method stays below the proven optimum of 5x5, and how often it reaches it."""
     own = ends[ends["grid"] == "5x5"]
-    gap = OPTIMUM_5X5 - own["best"]
-    reached = gap <= _REACHED
-    own = own.assign(gap=gap.mask(reached, 0.0), reached=reached)  # what is left is rounding
+    gap = (OPTIMUM_5X5 - own["best"]).map(_zero_or)
+    own = own.assign(gap=gap, reached=gap <= _REACHED)
     grouped = own.groupby(["budget", "method"], sort=False)
     return grouped.agg(
         searches=("gap", "size"), gap=("gap", "mean"), largest_gap=("gap", "max"), reached=("reached", "mean")
