@@ -185,10 +185,10 @@ def _summed_up(scores: pd.DataFrame) -> dict[str, Any]:
     ]
     return {
         "note": (
-            f"{plural(sum(row[1] for row in rows), 'recorded trajectory')} of real players (Carroll et al., NeurIPS 2019) "
-            f"in {plural(len(kitchens), 'kitchen')} that were not designed to be legible. Accuracy by share observed "
-            f"(in {scores.attrs['cut']}), ties shared out; every dispenser in reach is a candidate. Neither predictor "
-            "has learned anything from these players; chance is a guess among the candidates. The table averages over "
+            f"{plural(sum(row[1] for row in rows), 'recorded trajectory')} of real players (Carroll et al., NeurIPS "
+            f"2019) in {plural(len(kitchens), 'kitchen')} that were not designed to be legible. Accuracy by share "
+            f"observed (in {scores.attrs['cut']}), ties shared out; every dispenser in reach is a candidate. Neither "
+            "predictor has learned anything from these players; chance is a guess among the candidates. The table averages over "
             f"{fractions[0]:.0%} to {fractions[-1]:.0%}."
         ),
         "fractions": fractions,
