@@ -108,7 +108,8 @@ def test_score_and_objective_are_told_apart() -> None:
     from benchmarks.presenters.registry import presenter_of
 
     workspace = TabletopWorkspace()
-    genomes = workspace.sample(50, np.random.default_rng(0))
+    rng = np.random.default_rng(0)
+    genomes = workspace.perturb(workspace.sample(20, rng), 8, rng, phase=1)  # moves and adds obstacles
     genome = genomes[int(np.argmax(workspace.penalty(genomes)))]
     legibility, costs = float(workspace.legibility(genome)), float(workspace.penalty(genome[None])[0])
     assert costs > 0
