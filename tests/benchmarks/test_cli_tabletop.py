@@ -100,20 +100,31 @@ def test_the_report_shows_map_panels_and_reaches(run: Path) -> None:
     assert obstacles[1]["labels"][:2] == ["1.00", "1.01"]
 
 
-def test_score_and_objective_are_told_apart(run: Path) -> None:
+def test_score_and_objective_are_told_apart() -> None:
+    from types import SimpleNamespace
+    from typing import Any
+
     from benchmarks.cli.optimize import found_lines
     from benchmarks.presenters.registry import presenter_of
 
-    result = load_run(run)
-    genome, workspace = result.require_genome(), result.workspace
-    lines = found_lines(result, presenter_of("tabletop"))
-    legibility, costs = workspace.legibility(genome), float(workspace.penalty(genome[None])[0])
-    assert costs > 0, "this search found obstacles"
+    workspace = TabletopWorkspace()
+    rng = np.random.default_rng(0)
+    genomes = workspace.perturb(workspace.sample(20, rng), 8, rng, phase=1)  # moves and adds obstacles
+    genome = genomes[int(np.argmax(workspace.penalty(genomes)))]
+    legibility, costs = float(workspace.legibility(genome)), float(workspace.penalty(genome[None])[0])
+    assert costs > 0
+    objective = float(workspace.objective("legibility")(genome[None])[0])
+    assert objective == pytest.approx(legibility - costs)
+    found: Any = SimpleNamespace(
+        workspace=workspace, config={"objective": {"name": "legibility"}}, require_genome=lambda: genome,
+        best_objective=objective, evaluations=1, seconds=0.25,
+    )  # fmt: skip
+    lines = found_lines(found, presenter_of("tabletop"))
     assert lines[0].startswith(f"legibility {number(legibility)}, distance ")
+    assert lines[0].endswith("after 1 evaluation in 0.2 s")
     assert lines[1] == (
-        f"objective  {number(result.best_objective)}: legibility, net of costs of {number(costs)} (virtual obstacles)"
+        f"objective  {number(objective)}: legibility, net of costs of {number(costs)} (virtual obstacles)"
     )
-    assert result.best_objective == pytest.approx(legibility - costs)
 
 
 def test_report_is_written_anew(run: Path) -> None:
