@@ -155,10 +155,11 @@ class Workspace(ABC):
         return self._score(genomes, 1)
 
     def _score(self, genomes: npt.NDArray[Any], which: int) -> Any:
-        if np.ndim(genomes) != 1:
-            return self.scores(genomes)[which]
-        self.decode(genomes)
-        return float(self.scores(np.asarray(genomes)[None])[which][0])
+        array = number_rows("genomes", genomes, self.genome_size, or_one=True)
+        if array.ndim == 2:
+            return self.scores(array)[which]
+        self.decode(array)
+        return float(self.scores(array[None])[which][0])
 
     def penalty(self, genomes: npt.NDArray[Any]) -> Array:
         """``(n,)`` penalty that an objective subtracts from the score; zero unless a workspace overrides this."""
