@@ -83,15 +83,16 @@ class _Design(Protocol):
 class KeySpace:
     """The layouts of a workspace as vectors of ``m`` random keys in [0, 1]; every vector is a valid layout.
 
-    Vectors that would not be valid stand for one near by, which the workspace's decoder finds
-    (:meth:`.Workspace.key_decoder` documents how); the same vector always stands for the same layout. Keys below 0
-    count as 0 and keys above 1 as 1, so that emitters without bounds work too; give those that take bounds
-    :attr:`bounds`, or they wander where nothing changes any more. Keys that are NaN or infinite are refused.
+    Vectors that would not be valid stand for one near by, which the decoder finds (its class documents how); the same
+    vector always stands for the same layout. Keys below 0 count as 0 and keys above 1 as 1, so that emitters without
+    bounds work too; give those that take bounds :attr:`bounds`, or they wander where nothing changes any more. Keys
+    that are NaN or infinite are refused.
 
     Scores are those of :class:`.Workspace` and never NaN: any optimiser may keep and compare them.
 
     Args:
         workspace: The design problem; usually one calls its :meth:`~.Workspace.continuous`.
+        decoder: What turns keys into genomes and back; the workspace's own if None.
 
     Attributes:
         workspace: The design problem.
@@ -109,9 +110,9 @@ class KeySpace:
         (np.True_, np.True_)
     """
 
-    def __init__(self, workspace: _Design) -> None:
+    def __init__(self, workspace: _Design, decoder: KeyDecoder | None = None) -> None:
         self.workspace: Any = workspace
-        self.decoder = workspace.key_decoder()
+        self.decoder = workspace.key_decoder() if decoder is None else decoder
         if not isinstance(self.decoder, KeyDecoder):
             raise TypeError(
                 f"{type(workspace).__name__}.key_decoder() must return a KeyDecoder (legible_envs.random_keys), "
@@ -280,7 +281,7 @@ class KeySpace:
         return array
 
     def __reduce__(self) -> tuple[object, ...]:
-        return type(self), (self.workspace,)
+        return type(self), (self.workspace, self.decoder)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, KeySpace) and self.workspace == other.workspace

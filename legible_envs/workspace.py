@@ -112,14 +112,16 @@ class Workspace(ABC):
     def key_decoder(self) -> KeyDecoder:
         """How vectors of real numbers in [0, 1] stand for layouts (random keys); by default each key is one gene.
 
-        A workspace where :class:`~legible_envs.random_keys.BoundedKeys` must repair many layouts overrides this.
+        Emitters of :mod:`optimizers` that move in keys use it, repairing with the layouts they come from. A workspace
+        where :class:`~legible_envs.random_keys.BoundedKeys` must repair many layouts overrides this.
         """
         return BoundedKeys(self)
 
     def continuous(self) -> KeySpace:
         """The same design problem as vectors of real numbers in [0, 1], each of them a valid layout.
 
-        For optimisers that move points in a box, such as pyribs' own emitters: see :class:`~.KeySpace`.
+        For optimisers that move points in a box, such as pyribs' own emitters: see :class:`~.KeySpace`. It decodes by
+        :meth:`key_decoder` unless a workspace gives it another.
         """
         return KeySpace(self)
 

@@ -25,13 +25,14 @@ Floats = npt.NDArray[np.float64]
 class TableKeys(BoundedKeys):
     """One key per gene of a table, stretched to its bounds; every vector is a valid table.
 
-    With anchors, invalid tables are repaired as by :class:`~legible_envs.random_keys.BoundedKeys`. Without, objects
-    take the nearest place that leaves them room, one after the other, on a grid of 5 mm around where they should lie;
-    then each obstacle takes the nearest valid pose within 15 cm and a quarter turn (steps of 2 cm and 45 degrees, where
-    20 degrees count as much as 1.7 cm), and is left out where there is none. Tables that are valid stay as they are. If
-    objects find no room that way, all lie as in one fixed valid table.
+    Objects take the nearest place that leaves them room, one after the other, on a grid of 5 mm around where they
+    should lie; then each obstacle whose ``active`` is above one half takes the nearest valid pose within 15 cm and a
+    quarter turn (steps of 2 cm and 45 degrees, where 20 degrees count as much as 1.7 cm), and is left out where there
+    is none. Tables that are valid stay as they are. If objects find no room that way, all lie as in one fixed valid
+    table.
 
-    Genomes come packed: obstacles in the first places with ``active`` 1, zeros after them.
+    Genomes come packed: obstacles in the first places with ``active`` 1, zeros after them. In the keys of a genome an
+    obstacle has ``active`` .75, and an unused place .25 and the middle of the table: a small step may lay one there.
 
     Args:
         workspace: The design problem.
@@ -42,12 +43,19 @@ class TableKeys(BoundedKeys):
         super().__init__(workspace)
         self._rules = rules
 
+    def encode(self, genomes: npt.NDArray[Any]) -> Floats:
+        """``(n, m)`` keys of valid genomes."""
+        keys = super().encode(genomes)
+        places = keys[:, 2 * len(self._rules.movable) :].reshape(len(keys), -1, 4)
+        is_used = places[..., 0] > 0.5
+        places[..., 0] = np.where(is_used, 0.75, 0.25)
+        places[~is_used, 1:] = 0.5
+        return keys
+
     def decode(
         self, keys: Floats, anchors: npt.NDArray[Any] | None = None, rng: np.random.Generator | None = None
     ) -> Floats:
-        """``(n, d)`` valid genomes of ``(n, m)`` keys; see the class for how they are repaired."""
-        if anchors is not None:
-            return super().decode(keys, anchors, rng)
+        """``(n, d)`` valid genomes of ``(n, m)`` keys; neither ``anchors`` nor ``rng`` is needed."""
         wanted = self._stretch(keys)
         genomes = np.empty_like(wanted)
         settle_tables(wanted, self._rules.arrays, self._moves, _shifts(), self._anchor, genomes)

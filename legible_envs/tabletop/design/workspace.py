@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.errors import LayoutError
+from legible_envs.key_space import KeySpace
 from legible_envs.observer import ObserverModel, Ties
 from legible_envs.rollouts.trajectory import Trajectory
 from legible_envs.support.validation import choice, entries, flag, real, shown
@@ -289,9 +290,9 @@ class TabletopWorkspace(Workspace):
             simpler[i, first : first + 4 * (len(there) - 1)] = np.delete(there, i, axis=0).ravel()
         return simpler
 
-    def key_decoder(self) -> TableKeys:
-        """How vectors of real numbers in [0, 1] stand for tables."""
-        return TableKeys(self, self.rules)
+    def continuous(self) -> KeySpace:
+        """Tables as vectors of real numbers in [0, 1]; :class:`.TableKeys` documents what each key stands for."""
+        return KeySpace(self, TableKeys(self, self.rules))
 
     def _as_float(self, genomes: npt.ArrayLike) -> Array:
         return np.ascontiguousarray(as_batch(genomes, self.genome_size), dtype=np.float64)
