@@ -167,7 +167,7 @@ def test_stock_emitters_search_and_resume_to_the_same_archive(emitter, options, 
     assert KITCHEN.valid(whole.elites().solution).all()
     assert same_archive(load_run(tmp_path).archive, whole.archive)
     assert str(load_run(tmp_path).best_layout) == str(whole.best_layout)
-    with pytest.raises(RuntimeError, match="continuous"):
+    with pytest.warns(UserWarning, match="real numbers"), pytest.raises(RuntimeError, match="continuous"):
         search(KITCHEN, **settings, checkpoint=tmp_path, resume=True)
 
 
