@@ -189,9 +189,9 @@ def _paired(
                 f"{shown(options)}"
             )
     if len(given) != len(specs):
-        raise ValueError(
-            f"`emitter_options` must be one mapping per emitter: {len(specs)} for {len(specs)}, got {len(given)}"
-        )
+        number = len(specs)
+        needed = f"{number} emitters need {number} mappings" if number > 1 else "1 emitter needs 1 mapping"
+        raise ValueError(f"{needed} of `emitter_options`, got {len(given)}")
     return [(spec, dict(one)) for spec, one in zip(specs, given, strict=True)]
 
 

@@ -273,7 +273,10 @@ def test_options_that_are_missing_are_named(space):
         ({"emitter_options": 5}, "`emitter_options` must be None, keyword arguments such as .*, got 5"),
         ({"emitter_options": "sigma=1"}, "got 'sigma=1'"),
         ({"emitter_options": [{"a": 1}, None], "emitter": ["improve", "random"]}, "`emitter_options` must be None"),
-        ({"emitter_options": {}, "emitter": ["improve", "random"]}, "one mapping per emitter: 2 for 2, got 1"),
+        (
+            {"emitter_options": {}, "emitter": ["improve", "random"]},
+            "2 emitters need 2 mappings of `emitter_options`, got 1",
+        ),
         ({"emitter": []}, "give at least one emitter"),
         ({"seed": 1.5}, "`seed` must be an integer >= 0, got 1.5"),
         ({"seed": -1}, "`seed` must be an integer >= 0, got -1"),
