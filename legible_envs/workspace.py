@@ -15,9 +15,11 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
+from legible_envs.key_space import KeySpace
 from legible_envs.random_keys import BoundedKeys, KeyDecoder
+from legible_envs.support.arrays import number_rows
 from legible_envs.support.plugins import Plugin, Registry
-from legible_envs.support.validation import real
+from legible_envs.support.validation import integer, real, shown
 
 if TYPE_CHECKING:
     from legible_envs.rollouts.trajectory import Trajectory
@@ -42,8 +44,10 @@ CALIBRATION_SIZE: Final = 1000
 class Workspace(ABC):
     """Which layouts are allowed, how they vary, and how they score.
 
-    ``d`` is :attr:`genome_size`, ``n`` a batch size. All methods on genomes take ``(n, d)`` arrays; rows that are not
-    valid layouts score NaN.
+    ``d`` is :attr:`genome_size`, ``n`` a batch size. All methods on genomes take ``(n, d)`` arrays of any numeric type
+    (whole-valued floats are as good as integers); rows that are not valid layouts, among them those with fractions
+    where genes are whole numbers and those with NaN, score NaN. Optimisers that move points in a box of real numbers
+    search :meth:`continuous` instead, where no row is invalid.
 
     Attributes:
         name: Short name used in configurations, such as ``"overcooked"``.
@@ -108,9 +112,18 @@ class Workspace(ABC):
     def key_decoder(self) -> KeyDecoder:
         """How vectors of real numbers in [0, 1] stand for layouts (random keys); by default each key is one gene.
 
-        A workspace where :class:`~legible_envs.random_keys.BoundedKeys` must repair many layouts overrides this.
+        Emitters of :mod:`optimizers` that move in keys use it, repairing with the layouts they come from. A workspace
+        where :class:`~legible_envs.random_keys.BoundedKeys` must repair many layouts overrides this.
         """
         return BoundedKeys(self)
+
+    def continuous(self) -> KeySpace:
+        """The same design problem as vectors of real numbers in [0, 1], each of them a valid layout.
+
+        For optimisers that move points in a box, such as pyribs' own emitters: see :class:`~.KeySpace`. It decodes by
+        :meth:`key_decoder` unless a workspace gives it another.
+        """
+        return KeySpace(self)
 
     # -- what they score -------------------------------------------------------------------------------------------
 
@@ -144,10 +157,11 @@ class Workspace(ABC):
         return self._score(genomes, 1)
 
     def _score(self, genomes: npt.NDArray[Any], which: int) -> Any:
-        if np.ndim(genomes) != 1:
-            return self.scores(genomes)[which]
-        self.decode(genomes)
-        return float(self.scores(np.asarray(genomes)[None])[which][0])
+        array = number_rows("genomes", genomes, self.genome_size, or_one=True)
+        if array.ndim == 2:
+            return self.scores(array)[which]
+        self.decode(array)
+        return float(self.scores(array[None])[which][0])
 
     def penalty(self, genomes: npt.NDArray[Any]) -> Array:
         """``(n,)`` penalty that an objective subtracts from the score; zero unless a workspace overrides this."""
@@ -188,8 +202,14 @@ class Workspace(ABC):
         Args:
             genome: ``(d,)`` a valid genome.
             objective: What must not fall; legibility if None.
+
+        Raises:
+            LayoutError: The genome is not valid.
         """
         objective = objective or self.objective("legibility")
+        genome = as_single(genome, self.genome_size)[0]
+        if not np.asarray(self.valid(genome[None]))[0]:
+            self.decode(genome)
         genome = np.array(genome, dtype=self.genome_dtype)
         best = float(objective(genome[None])[0])
         while len(simpler := self.simplifications(genome)):
@@ -373,22 +393,29 @@ def list_workspaces() -> dict[str, Plugin]:
 
 
 def as_batch(genomes: npt.ArrayLike, size: int) -> npt.NDArray[Any]:
-    """Return genomes as an ``(n, size)`` array.
+    """Return genomes as an ``(n, size)`` array of numbers, in the type they came in.
 
     Raises:
         ValueError: Another shape, or data that is not numeric.
     """
-    array = np.asarray(genomes)
-    if array.ndim != 2 or array.shape[1] != size:
-        raise ValueError(f"expected genomes of shape (n, {size}), got {array.shape}")
-    if array.dtype.kind not in "biuf":
-        raise ValueError(f"expected numeric genomes, got dtype {array.dtype}")
-    return array
+    return number_rows("genomes", genomes, size)
 
 
 def as_single(genome: npt.ArrayLike, size: int) -> npt.NDArray[Any]:
     """Return one genome as a ``(1, size)`` batch; see :func:`as_batch`."""
-    array = np.asarray(genome)
-    if array.shape != (size,):
+    array = number_rows("genomes", genome, size, or_one=True)
+    if array.ndim != 1:
         raise ValueError(f"expected one genome of shape ({size},), got {array.shape}")
-    return as_batch(array[None], size)
+    return array[None]
+
+
+def check_draws(rng: np.random.Generator, **counts: int) -> None:
+    """Check what random genomes are drawn by: a generator, and how many.
+
+    Raises:
+        ValueError: A count is no whole number >= 0, or ``rng`` is no numpy Generator.
+    """
+    for name, count in counts.items():
+        integer(name, count, 0)
+    if not isinstance(rng, np.random.Generator):
+        raise ValueError(f"`rng` must be a numpy random Generator such as np.random.default_rng(0), got {shown(rng)}")

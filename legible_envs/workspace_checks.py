@@ -23,8 +23,8 @@ CHILDREN = 4
 def check_workspace(workspace: Workspace, *, seed: int = 0) -> None:
     """Check what a search, an environment or a report relies on.
 
-    Bounds, samples, children, scores, measures, decoding, pruning, pickling, configuration and repeatability; and that
-    the workspace leaves numpy's global random state alone.
+    Bounds, samples, children, scores, measures, random keys, decoding, pruning, pickling, configuration and
+    repeatability; and that the workspace leaves numpy's global random state alone.
 
     Args:
         workspace: The workspace to try.
@@ -35,7 +35,7 @@ def check_workspace(workspace: Workspace, *, seed: int = 0) -> None:
     """
     if not isinstance(workspace, Workspace):
         raise WorkspaceError(f"expected a Workspace, got {type(workspace).__name__}", problems=("not a Workspace",))
-    checks = (_genomes, _variation, _scores, _one_layout, _configuration)
+    checks = (_genomes, _variation, _scores, _keys, _one_layout, _configuration)
     found = find_problems({check.__name__.strip("_"): partial(check, workspace, seed) for check in checks})
     refuse(workspace, "workspace", found, WorkspaceError)
 
@@ -116,6 +116,32 @@ def _scores(workspace: Workspace, seed: int) -> Iterator[str]:
         yield "some measures lie outside archive_ranges"
     if len(workspace.measure_names) != 2:
         yield f"measure_names must be two names, got {workspace.measure_names!r}"
+
+
+def _keys(workspace: Workspace, seed: int) -> Iterator[str]:
+    """The continuous face: genomes come back from their keys, and every vector of keys is a valid layout."""
+    rng, space = _rng(seed), workspace.continuous()
+    genomes = workspace.sample(SAMPLES, rng)
+    keys, shape = space.encode(genomes), (SAMPLES, space.solution_dim)
+    if np.shape(keys) != shape or (keys < 0).any() or (keys > 1).any():
+        yield f"the key decoder encodes {SAMPLES} genomes as shape {np.shape(keys)}; expected {shape}, within [0, 1]"
+        return
+    back = space.decode(keys)
+    if back.shape != genomes.shape or not np.allclose(back, genomes, rtol=1e-9, atol=1e-9):
+        yield "some genomes do not come back from their keys"
+    cases = {
+        "random": rng.random(shape),
+        "extreme": rng.integers(0, 2, shape).astype(np.float64),
+        "outlying": rng.normal(0.5, 10.0, shape),
+        "equal": np.repeat(np.linspace(0, 1, SAMPLES)[:, None], shape[1], axis=1),
+    }
+    for name, given in cases.items():
+        decoded = space.decode(given)
+        yield from _batch_problems(workspace, decoded, SAMPLES, f"decoding {name} keys")
+        if not np.array_equal(decoded, space.decode(given)):
+            yield f"decoding {name} keys gives different layouts for the same keys"
+        elif not np.array_equal(decoded[:5], space.decode(given[:5])):
+            yield f"the layout that {name} keys stand for depends on the batch they are in"
 
 
 def _one_layout(workspace: Workspace, seed: int) -> Iterator[str]:

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from ribs.archives import GridArchive
 
+from legible_envs.key_space import KeySpace
 from legible_envs.support.files import write_npz
 from legible_envs.workspace import Workspace
 from optimizers.errors import SearchError
@@ -44,7 +45,11 @@ class WorkspaceArchive(GridArchive):
 
         Returns:
             ``status`` ``(n,)`` (0 not added, 1 improved its cell, 2 filled a new cell) and ``value`` ``(n,)``.
+
+        Raises:
+            ValueError: The archive's genomes are whole numbers and those given are not.
         """
+        self._refuse_fractions(solution)
         scores = np.asarray(objective, dtype=np.float64)
         scored = ~np.isnan(scores)
         if scored.all() and scored.size:
@@ -61,18 +66,36 @@ class WorkspaceArchive(GridArchive):
                 info[name][scored] = values
         return info
 
+    def _refuse_fractions(self, solution: npt.ArrayLike) -> None:
+        """What the archive would cut to whole numbers in silence is refused."""
+        genomes, dtype = np.asarray(solution), self.dtypes["solution"]
+        if np.issubdtype(dtype, np.integer) and genomes.dtype.kind == "f":
+            cut = ~(genomes == np.rint(genomes))
+            if cut.any():
+                row, gene = (int(i) for i in np.argwhere(cut)[0][-2:])
+                raise ValueError(
+                    f"genomes of this archive are whole numbers ({dtype}); gene {gene} of row {row} is "
+                    f"{genomes[row, gene]:g}. For solutions that are real numbers, make_archive(workspace.continuous())"
+                )
+
 
 def make_archive(
-    workspace: Workspace,
+    workspace: Workspace | KeySpace,
     *,
     seed: int | np.random.SeedSequence | None = None,
     score_floor: float | None = None,
     **options: Any,
 ) -> WorkspaceArchive:
-    """Make the archive that fits a workspace: integer genomes, one cell per combination of its measures.
+    """Make the archive that fits a workspace: its genomes, one cell per combination of its measures.
+
+    Where genomes are whole numbers, so are the archive's solutions, and pyribs' own emitters cannot move there: they
+    take the type of their step sizes from the archive, so that ``sigma=0.5`` becomes 0, and their evolution strategies
+    fail in compiled code. For a loop of your own with them, make the archive of ``workspace.continuous()``, whose
+    solutions are random keys in [0, 1] (float64).
 
     Args:
-        workspace: The design problem; gives genome size and type, archive dimensions and ranges.
+        workspace: The design problem; gives genome size and type, archive dimensions and ranges. Or its
+            ``continuous()``.
         seed: Seed of the archive's own sampling.
         score_floor: Subtracted from scores in the QD score, so that filling a cell never lowers it; default the
             workspace's own lower bound.
@@ -81,12 +104,16 @@ def make_archive(
     Returns:
         An empty archive.
     """
+    if isinstance(workspace, KeySpace):
+        size, dtype = workspace.solution_dim, np.dtype(np.float64)
+    else:
+        size, dtype = workspace.genome_size, workspace.genome_dtype
     settings: dict[str, Any] = {
-        "solution_dim": int(workspace.genome_size),
+        "solution_dim": int(size),
         "dims": [int(n) for n in workspace.archive_dims],
         "ranges": [(float(low), float(high)) for low, high in workspace.archive_ranges],
         "qd_score_offset": float(workspace.score_floor if score_floor is None else score_floor),
-        "solution_dtype": workspace.genome_dtype,
+        "solution_dtype": dtype,
     }
     return WorkspaceArchive(seed=seed, **{**settings, **options})
 

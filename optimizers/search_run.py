@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from ribs.schedulers import Scheduler
 
+from legible_envs.key_space import KeySpace
 from legible_envs.support.files import remove_leftovers
 from legible_envs.workspace import Workspace
 from optimizers.archives import WorkspaceArchive, make_archive, write_archive
@@ -70,6 +71,7 @@ class SearchRun:
     seed: int
     folder: RunFolder | None
     checkpoint_every: float
+    space: KeySpace | None = None
 
     def __post_init__(self) -> None:
         root = np.random.SeedSequence(self.seed)
@@ -79,7 +81,7 @@ class SearchRun:
             make_emitter(
                 spec,
                 archive,
-                self.workspace,
+                self.workspace if self.space is None else self.space,
                 seed=int(child.generate_state(1)[0]),
                 evaluations=self.evaluations,
                 iterations=None if self.iterations is None else self.iterations[1],
@@ -241,6 +243,7 @@ class SearchRun:
         archive = self.state.archive
         described = {
             "workspace": self.workspace.to_config(),
+            **({} if self.space is None else {"continuous": True}),
             "objective": {"name": self.evaluator.name, "max_distance": self.evaluator.max_distance},
             "emitter": [{"name": emitter_name(spec), "options": options} for spec, options in self.emitters],
             "archive": {

@@ -13,7 +13,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from legible_envs.support.validation import choice, integer, integers
+from legible_envs.key_space import KeySpace
+from legible_envs.support.validation import choice, entries, integer, integers, is_integer, real, shown
 from legible_envs.workspace import Workspace
 from optimizers.emitters.registry import EmitterSpec
 from optimizers.errors import SearchInterrupted
@@ -32,7 +33,7 @@ Callback = Callable[[SearchState], object]
 
 
 def search(
-    workspace: Workspace,
+    workspace: Workspace | KeySpace,
     *,
     objective: str | Objective = "legibility",
     emitter: EmitterSpec | Sequence[EmitterSpec] = "improve",
@@ -58,7 +59,9 @@ def search(
     (``time_limit`` and Ctrl-C decide only how far it gets).
 
     Args:
-        workspace: The design problem, such as ``OvercookedWorkspace()``.
+        workspace: The design problem, such as ``OvercookedWorkspace()``. Or its ``continuous()``: then emitters that
+            know no workspace, such as pyribs' own, move in random keys (:class:`~legible_envs.key_space.KeySpace`);
+            archive, checkpoints and result are of layouts all the same.
         objective: Name known to ``workspace.objective``, or a callable from ``(n, d)`` genomes to ``(n,)`` scores to be
             maximised, NaN where a layout is not allowed.
         emitter: Name, ``"module:Class"``, factory or proposing function (:mod:`optimizers.emitters.registry`), or
@@ -71,7 +74,7 @@ def search(
             which the manifest then names.
         initial: Random layouts scored first (20 % obstacles in a kitchen). ``iterations`` overrides it.
         max_distance: Layouts whose expected distance over one task execution is greater are not allowed.
-        emitter_options: Keyword arguments of the emitter, or one mapping per emitter.
+        emitter_options: Keyword arguments of the emitter, such as ``{"sigma": 0.1}``, or one mapping per emitter.
         checkpoint: Folder of the run; everything in :mod:`.folder` is written there. None writes nothing.
         resume: True continues the run in that folder and fails if there is none; ``"auto"`` begins one if there is
             none. ``evaluations`` may have grown, everything else must be as it was; the emitters go on with the
@@ -101,8 +104,14 @@ def search(
     if iterations is None:
         evaluations = _DEFAULT_EVALUATIONS if evaluations is None else evaluations
     _check_budget(evaluations, iterations, initial, resume, checkpoint)
+    _check_conduct(seed, checkpoint_every, time_limit, callbacks)
+    space = workspace if isinstance(workspace, KeySpace) else None
+    workspace = workspace if space is None else space.workspace
+    if not isinstance(workspace, Workspace):
+        raise TypeError(f"`workspace` must be a Workspace or its continuous(), got {shown(workspace)}")
     run = SearchRun(
         workspace=workspace,
+        space=space,
         evaluator=Evaluator(workspace, objective, max_distance, scheduler),
         emitters=_paired(emitter, emitter_options),
         evaluations=evaluations,
@@ -170,13 +179,19 @@ def _paired(
     if not specs:
         raise ValueError("give at least one emitter")
     if options is None:
-        given: list[Mapping[str, Any]] = [{} for _ in specs]
-    elif isinstance(options, Mapping):
-        given = [options]
+        given: list[Any] = [{} for _ in specs]
     else:
-        given = list(options)
+        given = list(options) if isinstance(options, list | tuple) else [options]
+    for one in given:
+        if not isinstance(one, Mapping) or not all(isinstance(name, str) for name in one):
+            raise ValueError(
+                "`emitter_options` must be None, keyword arguments such as {'sigma': 0.1}, or a list of such, got "
+                f"{shown(options)}"
+            )
     if len(given) != len(specs):
-        raise ValueError(f"{len(specs)} emitters need {len(specs)} mappings of emitter_options, got {len(given)}")
+        number = len(specs)
+        needed = f"{number} emitters need {number} mappings" if number > 1 else "1 emitter needs 1 mapping"
+        raise ValueError(f"{needed} of `emitter_options`, got {len(given)}")
     return [(spec, dict(one)) for spec, one in zip(specs, given, strict=True)]
 
 
@@ -184,12 +199,23 @@ def _check_budget(
     evaluations: int | None, iterations: tuple[int, int] | None, initial: int, resume: object, checkpoint: object
 ) -> None:
     integers(1, evaluations=evaluations)
-    if iterations is not None and (len(iterations) != 2 or iterations[0] < 1 or iterations[1] < 0):
-        raise ValueError(f"`iterations` must be (random layouts >= 1, climbs >= 0), got {iterations!r}")
+    if iterations is not None:
+        counts = entries(iterations)
+        if len(counts) != 2 or not all(map(is_integer, counts)) or counts[0] < 1 or counts[1] < 0:
+            raise ValueError(f"`iterations` must be (random layouts >= 1, climbs >= 0), got {shown(iterations)}")
     integer("initial", initial, 1)
     choice("resume", resume, (True, False, "auto"))
     if resume and checkpoint is None:
         raise ValueError("resume needs checkpoint=, the folder of the run")
+
+
+def _check_conduct(seed: object, checkpoint_every: object, time_limit: object, callbacks: object) -> None:
+    integers(0, seed=seed)
+    real("checkpoint_every", checkpoint_every, 0, unit="seconds")
+    if time_limit is not None:
+        real("time_limit", time_limit, 0, also="None", unit="seconds")
+    if not isinstance(callbacks, Sequence) or not all(map(callable, callbacks)):
+        raise ValueError(f"`callbacks` must be functions of the state of the search, got {shown(callbacks)}")
 
 
 @contextmanager

@@ -99,7 +99,9 @@ class Registry:
         if not isinstance(spec, str):
             if self._fits(spec):
                 return spec
-            raise self.error(f"a {self.kind} is a name, 'module:Class' or a callable, got {type(spec).__name__}")
+            raise self.error(
+                f"{_with_article(self.kind)} is a name, 'module:Class' or a callable, got {type(spec).__name__}"
+            )
         if spec in self._registered:
             return self._registered[spec]
         target = self._built_in.get(spec)
@@ -123,6 +125,10 @@ class Registry:
 
     def _installed(self) -> dict[str, EntryPoint]:
         return {point.name: point for point in entry_points(group=self.group)}
+
+
+def _with_article(noun: str) -> str:
+    return f"{'an' if noun[0] in 'aeiou' else 'a'} {noun}"
 
 
 def target_of(factory: Any) -> str:

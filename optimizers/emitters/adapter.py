@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from legible_envs.key_space import KeySpace
 from legible_envs.workspace import Workspace
 from optimizers.emitters.base import AddInfo, Seed, WorkspaceEmitter
 from optimizers.errors import EmitterError
@@ -15,7 +16,7 @@ from optimizers.errors import EmitterError
 if TYPE_CHECKING:
     from ribs.archives import ArchiveBase
 
-__all__ = ["FloatArchiveView", "FunctionEmitter", "GenomeAdapter"]
+__all__ = ["FloatArchiveView", "FunctionEmitter", "GenomeAdapter", "KeyAdapter", "KeyArchiveView"]
 
 _PATIENCE = 100
 
@@ -65,12 +66,32 @@ class FloatArchiveView:
         """All elites, as ``archive.data``."""
         found = self._archive.data(fields, return_type)
         if fields == "solution" and return_type is None:
-            return found.astype(np.float64)
+            return self._seen(found)
         return self._as_float(found) if isinstance(found, Mapping) else found
 
-    @staticmethod
-    def _as_float(data: Mapping[str, Any]) -> dict[str, Any]:
-        return {name: np.asarray(v, dtype=np.float64) if name == "solution" else v for name, v in data.items()}
+    def _as_float(self, data: Mapping[str, Any]) -> dict[str, Any]:
+        return {name: self._seen(values) if name == "solution" else values for name, values in data.items()}
+
+    def _seen(self, genomes: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
+        """``(n, d)`` genomes, or one ``(d,)``, as the emitter sees them."""
+        return np.asarray(genomes, dtype=np.float64)
+
+
+class KeyArchiveView(FloatArchiveView):
+    """An archive of genomes seen by an emitter that moves in random keys: the same elites, as keys in [0, 1]."""
+
+    def __init__(self, archive: ArchiveBase, space: KeySpace) -> None:
+        super().__init__(archive)
+        self._space = space
+
+    @property
+    def solution_dim(self) -> int:
+        """Number of keys."""
+        return self._space.solution_dim
+
+    def _seen(self, genomes: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
+        keys = self._space.decoder.encode(np.atleast_2d(genomes))
+        return keys if np.ndim(genomes) == 2 else keys[0]
 
 
 class GenomeAdapter(WorkspaceEmitter):
@@ -110,6 +131,7 @@ class GenomeAdapter(WorkspaceEmitter):
         self._name = name
         self._initial = initial
         self._worst = np.inf
+        self._width = int(archive.solution_dim)
         self.raw: npt.NDArray[Any] | None = None
         self._kept = np.zeros(0, dtype=bool)
 
@@ -130,9 +152,9 @@ class GenomeAdapter(WorkspaceEmitter):
             return self._workspace.sample(self._initial, self._rng)
         for _ in range(_PATIENCE):
             raw = np.asarray(self.emitter.ask())
-            if raw.ndim != 2 or raw.shape[1] != self.solution_dim or not np.issubdtype(raw.dtype, np.number):
+            if raw.ndim != 2 or raw.shape[1] != self._width or not np.issubdtype(raw.dtype, np.number):
                 raise EmitterError(
-                    f"{self._name}: ask() must return numbers of shape (n, {self.solution_dim}), "
+                    f"{self._name}: ask() must return numbers of shape (n, {self._width}), "
                     f"it returned {raw.dtype} of shape {raw.shape}"
                 )
             genomes = self.to_genomes(raw)
@@ -179,6 +201,38 @@ class GenomeAdapter(WorkspaceEmitter):
             if name in add_info:
                 info[name][rows] = np.asarray(add_info[name])[scored]
         self.emitter.tell(self.raw, whole_scores, whole_measures, info)
+
+
+class KeyAdapter(GenomeAdapter):
+    """Lets an emitter that knows no workspace move in random keys: what it proposes is always a valid layout.
+
+    The archive of the search holds layouts, as ever; the emitter sees their keys (:class:`KeyArchiveView`).
+
+    Args:
+        archive: Archive of the search, on genomes.
+        space: The random keys of the design problem.
+        emitter: The emitter to adapt.
+        name: What to call it in errors.
+        seed: Seed of the random layouts.
+    """
+
+    def __init__(
+        self, archive: ArchiveBase, space: KeySpace, emitter: Any, *, name: str = "emitter", seed: Seed = None
+    ) -> None:
+        super().__init__(archive, space.workspace, emitter, name=name, seed=seed)
+        self._space = space
+        self._width = space.solution_dim
+
+    def to_genomes(self, raw: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """``(n, d)`` the layouts that ``(n, m)`` keys stand for.
+
+        Raises:
+            EmitterError: Keys that are not finite.
+        """
+        try:
+            return self._space.decode(raw)
+        except ValueError as error:
+            raise EmitterError(f"{self._name}: ask() proposed what no layout is made of: {error}") from error
 
 
 class FunctionEmitter(WorkspaceEmitter):

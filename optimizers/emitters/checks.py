@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from legible_envs.key_space import KeySpace
 from legible_envs.support.contracts import global_random_state
 from legible_envs.workspace import Workspace
 from optimizers.emitters.registry import EmitterSpec, emitter_name, make_emitter, resolve_emitter
@@ -21,7 +22,11 @@ _INITIAL = 64
 
 
 def check_emitter(
-    emitter: EmitterSpec, workspace: Workspace | None = None, *, options: Mapping[str, Any] | None = None, seed: int = 0
+    emitter: EmitterSpec,
+    workspace: Workspace | KeySpace | None = None,
+    *,
+    options: Mapping[str, Any] | None = None,
+    seed: int = 0,
 ) -> None:
     """Run an emitter for a few batches and check everything a search relies on.
 
@@ -31,7 +36,8 @@ def check_emitter(
 
     Args:
         emitter: Name, ``"module:Class"``, factory or proposing function.
-        workspace: Where to try it; default a 5x5 kitchen.
+        workspace: Where to try it; default a 5x5 kitchen. Emitters that know no workspace may be tried in random keys:
+            give ``workspace.continuous()``.
         options: Its keyword arguments.
         seed: Seed of the trial.
 
@@ -59,10 +65,13 @@ def check_emitter(
 class _Trial:
     """A short search with one emitter, watched closely; what it proposed, and what was wrong."""
 
-    def __init__(self, spec: EmitterSpec, workspace: Workspace, options: Mapping[str, Any] | None, seed: int) -> None:
+    def __init__(
+        self, spec: EmitterSpec, given: Workspace | KeySpace, options: Mapping[str, Any] | None, seed: int
+    ) -> None:
         from optimizers.archives import make_archive
         from optimizers.emitters.adapter import GenomeAdapter
 
+        workspace: Workspace = given.workspace if isinstance(given, KeySpace) else given
         self.workspace = workspace
         self.problems: list[str] = []
         self.batches: list[npt.NDArray[Any]] = []
@@ -72,7 +81,7 @@ class _Trial:
         start = workspace.sample(_INITIAL, self._rng)
         self.archive.add(start, self._rng.random(len(start)), workspace.measures(start))
         before = global_random_state()
-        self.emitter = make_emitter(spec, self.archive, workspace, seed=seed, options=options)
+        self.emitter = make_emitter(spec, self.archive, given, seed=seed, options=options)
         self._adapted = isinstance(self.emitter, GenomeAdapter)
         for round_ in range(_ROUNDS):
             if not self._one_round(round_):

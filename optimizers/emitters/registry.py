@@ -23,7 +23,9 @@ if present.
 **Emitters that know no workspace** (pyribs' own): where the factory has no ``workspace`` parameter it gets the archive
 with real-valued genomes, and a random layout as ``x0`` where it takes one. It is not told the bounds: what it proposes
 is rounded and clipped (pyribs' evolution strategies would redraw until every gene is inside, which on small integer
-ranges may take forever).
+ranges may take forever). Few of its proposals are then valid layouts; ``search(workspace.continuous(), ...)`` gives
+such emitters :class:`random keys <legible_envs.key_space.KeySpace>` to move in, and all are. Beside them, emitters that
+know the workspace get the workspace itself, and share the archive of layouts.
 
 **A plain function** works too: any function with a parameter named ``rng``, called as ``propose(archive, workspace,
 rng, **options)`` for each batch and returning ``(n, d)`` genomes.
@@ -35,11 +37,13 @@ rng, **options)`` for each batch and returning ``(n, d)`` genomes.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
+import warnings
+from collections.abc import Callable, Mapping, Set
 from typing import Any
 
 import numpy as np
 
+from legible_envs.key_space import KeySpace
 from legible_envs.support.plugins import Plugin, Registry, target_of
 from legible_envs.workspace import Workspace
 from optimizers.errors import EmitterError
@@ -81,6 +85,7 @@ def register_emitter(name: str, factory: Callable[..., Any], *, overwrite: bool 
     Raises:
         EmitterError: The name is taken or not a name, or the factory cannot be called.
     """
+    _refuse_instance(factory)
     _registry.register(name, factory, overwrite=overwrite)
 
 
@@ -93,9 +98,20 @@ def resolve_emitter(spec: EmitterSpec) -> Callable[..., Any]:
     """Find a factory by name, ``"module:Class"``, or return the callable given.
 
     Raises:
-        EmitterError: Nothing of that name, or it cannot be imported.
+        EmitterError: Nothing of that name, it cannot be imported, or it is an emitter made already.
     """
+    _refuse_instance(spec)
     return _registry.resolve(spec)
+
+
+def _refuse_instance(spec: Any) -> None:
+    """Refuse an emitter where what makes one is expected."""
+    if not inspect.isclass(spec) and hasattr(spec, "ask") and hasattr(spec, "tell"):
+        kind = type(spec).__name__
+        raise EmitterError(
+            f"got a {kind} that is made already; give its class, and its arguments as emitter options: "
+            f"emitter={kind}, emitter_options={{...}}. A search makes its emitters itself, with its archive and seed"
+        )
 
 
 def emitter_name(spec: EmitterSpec) -> str:
@@ -106,7 +122,7 @@ def emitter_name(spec: EmitterSpec) -> str:
 def make_emitter(
     spec: EmitterSpec,
     archive: Any,
-    workspace: Workspace,
+    workspace: Workspace | KeySpace,
     *,
     seed: int,
     evaluations: int | None = None,
@@ -118,7 +134,8 @@ def make_emitter(
     Args:
         spec: Name, ``"module:Class"``, factory or proposing function.
         archive: The archive of the search.
-        workspace: The design problem.
+        workspace: The design problem; or its ``continuous()``, so that emitters that know no workspace move in random
+            keys.
         seed: Seed of everything the emitter draws.
         evaluations: Planned number of evaluations, for emitters that want to know.
         iterations: Number of own iterations, for emitters that count them.
@@ -128,33 +145,71 @@ def make_emitter(
         An emitter that proposes valid genomes only.
 
     Raises:
-        EmitterError: Unknown emitter, options it does not take, or something that is not an emitter came out.
-    """
-    from optimizers.emitters.adapter import FloatArchiveView, FunctionEmitter, GenomeAdapter
+        EmitterError: Unknown emitter, options it does not take or lacks, or something that is not an emitter came out.
 
+    Warns:
+        UserWarning: One of pyribs' own emitters is to move in genomes of whole numbers.
+    """
+    from optimizers.emitters.adapter import FunctionEmitter, GenomeAdapter, KeyAdapter
+
+    space = workspace if isinstance(workspace, KeySpace) else None
+    design: Workspace = workspace if space is None else space.workspace  # type: ignore[assignment]
     factory = resolve_emitter(spec)
     name = emitter_name(spec)
     options = dict(options or {})
     parameters, takes_any = _parameters(factory)
+    knows_workspace = "workspace" in parameters or takes_any
     if not inspect.isclass(factory) and "rng" in parameters:
-        _refuse_unknown(name, options, parameters, takes_any, {"archive", "workspace", "rng"})
-        emitter: Any = FunctionEmitter(archive, workspace, propose=factory, options=options, seed=seed)
+        ours = {"archive", "workspace", "rng"}
+        _check_options(name, options, parameters, takes_any, ours, given=ours)
+        emitter: Any = FunctionEmitter(archive, design, propose=factory, options=options, seed=seed)
+        knows_workspace = True
     else:
-        offered: dict[str, Any] = {"archive": archive, "workspace": workspace, "seed": seed}
+        offered: dict[str, Any] = {"archive": archive, "workspace": design, "seed": seed}
         offered |= {"evaluations": evaluations, "iterations": iterations}
-        if "workspace" not in parameters and not takes_any:
-            offered["archive"] = FloatArchiveView(archive)
-            if "x0" in parameters and not {"x0", "initial_solutions"} & options.keys():
-                offered["x0"] = workspace.sample(1, np.random.default_rng(seed))[0].astype(np.float64)
-        _refuse_unknown(name, options, parameters, takes_any, set())
+        if not knows_workspace:
+            offered |= _offered_to_strangers(factory, name, archive, workspace, seed, parameters, options)
         wanted = {key: value for key, value in offered.items() if takes_any or key in parameters}
+        _check_options(name, options, parameters, takes_any, set(), given=wanted.keys() | options.keys())
         emitter = _call(factory, name, {**wanted, **options})
     for needed in ("ask", "tell", "solution_dim"):
         if not hasattr(emitter, needed):
             raise EmitterError(f"{name}: the factory returned a {type(emitter).__name__}, which has no {needed!r}")
     if getattr(emitter, "emits_valid", False):
         return emitter
-    return GenomeAdapter(archive, workspace, emitter, name=name, seed=np.random.SeedSequence((seed, 1)))
+    own_seed = np.random.SeedSequence((seed, 1))
+    if space is not None and not knows_workspace:
+        return KeyAdapter(archive, space, emitter, name=name, seed=own_seed)
+    return GenomeAdapter(archive, design, emitter, name=name, seed=own_seed)
+
+
+def _offered_to_strangers(
+    factory: Callable[..., Any],
+    name: str,
+    archive: Any,
+    workspace: Workspace | KeySpace,
+    seed: int,
+    parameters: Mapping[str, bool],
+    options: Mapping[str, Any],
+) -> dict[str, Any]:
+    """Arguments for an emitter that knows no workspace: the archive in real numbers, and where to begin."""
+    from optimizers.emitters.adapter import FloatArchiveView, KeyArchiveView
+
+    offered: dict[str, Any] = {}
+    if isinstance(workspace, KeySpace):
+        offered["archive"] = KeyArchiveView(archive, workspace)
+    else:
+        offered["archive"] = FloatArchiveView(archive)
+        is_whole = np.issubdtype(workspace.genome_dtype, np.integer)
+        if is_whole and inspect.isclass(factory) and factory.__module__.partition(".")[0] == "ribs":
+            warnings.warn(
+                f"{name} takes steps in real numbers, and genomes of this workspace are whole numbers: its proposals "
+                "are rounded, and most are no valid layouts. Search workspace.continuous() instead, where all are",
+                stacklevel=3,
+            )
+    if "x0" in parameters and not {"x0", "initial_solutions"} & options.keys():
+        offered["x0"] = workspace.sample(1, np.random.default_rng(seed))[0].astype(np.float64)
+    return offered
 
 
 def _call(factory: Callable[..., Any], name: str, arguments: dict[str, Any]) -> Any:
@@ -167,20 +222,34 @@ def _call(factory: Callable[..., Any], name: str, arguments: dict[str, Any]) -> 
         raise EmitterError(f"{name}: {error}") from error
 
 
-def _parameters(factory: Callable[..., Any]) -> tuple[set[str], bool]:
-    """Names a factory accepts as keywords, and whether it takes any others too."""
+def _parameters(factory: Callable[..., Any]) -> tuple[dict[str, bool], bool]:
+    """Names a factory accepts as keywords, with whether it needs each, and whether it takes any others too."""
     try:
         parameters = inspect.signature(factory).parameters.values()
     except (TypeError, ValueError):
-        return set(), True
-    names = {p.name for p in parameters if p.kind in (p.POSITIONAL_OR_KEYWORD, p.KEYWORD_ONLY)}
-    return names, any(p.kind is p.VAR_KEYWORD for p in parameters)
+        return {}, True
+    by_keyword = [p for p in parameters if p.kind in (p.POSITIONAL_OR_KEYWORD, p.KEYWORD_ONLY)]
+    return {p.name: p.default is p.empty for p in by_keyword}, any(p.kind is p.VAR_KEYWORD for p in parameters)
 
 
-def _refuse_unknown(name: str, options: Mapping[str, Any], known: set[str], takes_any: bool, ours: set[str]) -> None:
-    unknown = sorted(options.keys() - (known - ours))
+def _check_options(
+    name: str,
+    options: Mapping[str, Any],
+    parameters: Mapping[str, bool],
+    takes_any: bool,
+    ours: set[str],
+    *,
+    given: Set[str],
+) -> None:
+    """Refuse options that a factory does not take, and options that it needs and was not given."""
+    known = sorted(parameters.keys() - {"archive", "workspace", "seed", "self", *ours})
+    unknown = sorted(options.keys() - (parameters.keys() - ours))
     if unknown and not takes_any:
-        reserved = {"archive", "workspace", "seed", "self", *ours}
+        raise EmitterError(f"{name} has no option {', '.join(unknown)}; its options: {', '.join(known)}")
+    missing = [key for key, needed in parameters.items() if needed and key not in given and key not in options]
+    if missing:
+        spelled = ", ".join(f"{key!r}: ..." for key in missing)
         raise EmitterError(
-            f"{name} has no option {', '.join(unknown)}; its options: {', '.join(sorted(known - reserved))}"
+            f"{name} needs the emitter option{'s' * (len(missing) > 1)} {', '.join(missing)}, without a default "
+            f"(in Python: emitter_options={{{spelled}}}); its options: {', '.join(known)}"
         )

@@ -37,7 +37,10 @@ class KitchenKeys(KeyDecoder):
         return (np.asarray(genomes, dtype=np.float64) + 0.5) / (self._upper + 1.0)
 
     def decode(
-        self, keys: npt.NDArray[np.float64], anchors: npt.NDArray[Any], rng: np.random.Generator
+        self,
+        keys: npt.NDArray[np.float64],
+        anchors: npt.NDArray[Any] | None = None,
+        rng: np.random.Generator | None = None,
     ) -> npt.NDArray[np.int8]:
         """``(n, d)`` valid genomes of ``(n, m)`` keys; neither ``anchors`` nor ``rng`` is needed.
 

@@ -25,7 +25,7 @@ from legible_envs.overcooked.scoring.scorer import OvercookedScorer
 from legible_envs.overcooked.scoring.tables import make_tables
 from legible_envs.support.validation import choice, entries, integer, real, shown
 from legible_envs.tasks import TaskGraph
-from legible_envs.workspace import Array, Workspace, as_batch, as_single, make_workspace
+from legible_envs.workspace import Array, Workspace, as_batch, as_single, check_draws, make_workspace
 
 if TYPE_CHECKING:
     from legible_envs.rollouts.trajectory import Trajectory
@@ -207,6 +207,7 @@ class OvercookedWorkspace(Workspace):
         Raises:
             LayoutError: Two million draws in a row broke a rule: the rules leave (almost) no room.
         """
+        check_draws(rng, n=n)
         obstacle_rate = real("obstacle_rate", obstacle_rate, 0, 1)
         genomes = np.zeros((n, self.genome_size), dtype=np.int8)
         first = 0
@@ -229,6 +230,7 @@ class OvercookedWorkspace(Workspace):
         Each child differs by one change: a station moved to a free counter, two stations swapped, an obstacle added,
         or one removed. A parent that has no valid child repeats itself.
         """
+        check_draws(rng, k=k)
         choice("phase", phase, range(self.phases))
         parents, valid = self._as_int8(genomes)
         if not (valid & self.valid(parents)).all():
@@ -246,6 +248,7 @@ class OvercookedWorkspace(Workspace):
 
     def simplifications(self, genome: npt.NDArray[Any]) -> npt.NDArray[np.int8]:
         """``(m, d)`` the genome without one of its ``m`` obstacles."""
+        genome = as_single(genome, self.genome_size)[0]
         bits = np.flatnonzero(genome[len(self.stations) :]) + len(self.stations)
         simpler = np.repeat(np.asarray(genome, dtype=np.int8)[None], len(bits), axis=0)
         simpler[np.arange(len(bits)), bits] = 0

@@ -134,7 +134,7 @@ class DesignRules:
         if len(bad):
             i = int(bad[0])
             raise LayoutError(
-                f"gene {i} ({self._gene(i)}) is {genome[i]!r}; expected {self.lower_bounds[i]:g} to "
+                f"gene {i} ({self._gene(i)}) is {float(genome[i])!r}; expected {self.lower_bounds[i]:g} to "
                 f"{self.upper_bounds[i]:g}",
                 rule="range",
             )

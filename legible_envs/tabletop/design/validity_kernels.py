@@ -24,7 +24,20 @@ from legible_envs.tabletop.geometry.visibility_kernels import (
     path_tables,
 )
 
-__all__ = ["EDGE", "Room", "Rules", "batch_detours", "make_room", "obeys", "valid_genomes"]
+__all__ = [
+    "EDGE",
+    "Room",
+    "Rules",
+    "batch_detours",
+    "make_room",
+    "obeys",
+    "obstacle_allowed",
+    "on_table",
+    "place",
+    "too_close",
+    "valid_genomes",
+    "ways_allowed",
+]
 
 EDGE = 1e-9
 
@@ -170,23 +183,27 @@ def distance_to(box: Floats, x: float, y: float) -> float:
 
 
 @kernel
+def too_close(rules: Rules, points: Floats, i: int, j: int) -> bool:
+    """Whether two objects lie nearer than ``object_spacing``, or overlap."""
+    a, b = rules.shapes[i], rules.shapes[j]
+    dx, dy = points[i, 0] - points[j, 0], points[i, 1] - points[j, 1]
+    distance = norm(dx, dy)
+    if distance < rules.object_spacing - EDGE:
+        return True
+    return distance < norm(a[2], a[3]) + norm(b[2], b[3]) and gap(dx, dy, a, b) < -EDGE
+
+
+@kernel
 def objects_allowed(rules: Rules, points: Floats) -> bool:
     """Whether objects lie on the table, apart from one another."""
     for i in range(len(rules.shapes)):
         if rules.fixed[i]:
             continue
-        a = rules.shapes[i]
-        if not on_table(points[i, 0], points[i, 1], a, rules.size):
+        if not on_table(points[i, 0], points[i, 1], rules.shapes[i], rules.size):
             return False
         for j in range(len(rules.shapes)):
-            if j < i or (rules.fixed[j] and j != i):
-                b = rules.shapes[j]
-                dx, dy = points[i, 0] - points[j, 0], points[i, 1] - points[j, 1]
-                distance = norm(dx, dy)
-                if distance < rules.object_spacing - EDGE:
-                    return False
-                if distance < norm(a[2], a[3]) + norm(b[2], b[3]) and gap(dx, dy, a, b) < -EDGE:
-                    return False
+            if (j < i or (rules.fixed[j] and j != i)) and too_close(rules, points, i, j):
+                return False
     return True
 
 

@@ -12,19 +12,21 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.errors import LayoutError
+from legible_envs.key_space import KeySpace
 from legible_envs.observer import ObserverModel, Ties
 from legible_envs.rollouts.trajectory import Trajectory
 from legible_envs.support.validation import choice, entries, flag, real, shown
 from legible_envs.tabletop.design import genome_kernels as kernels
 from legible_envs.tabletop.design import measures
 from legible_envs.tabletop.design import validity_kernels as validity
+from legible_envs.tabletop.design.keys import TableKeys
 from legible_envs.tabletop.design.rules import DesignRules
 from legible_envs.tabletop.layout import MAX_OBSTACLES, TabletopLayout
 from legible_envs.tabletop.objects import OBSTACLE_SIZE, numbers
 from legible_envs.tabletop.scoring.explanation import summarise
 from legible_envs.tabletop.scoring.scorer import TableScores, TabletopScorer
 from legible_envs.tabletop.task import TabletopTask, read_task, task_names
-from legible_envs.workspace import Array, ObjectiveName, Workspace, as_batch, as_single, make_workspace
+from legible_envs.workspace import Array, ObjectiveName, Workspace, as_batch, as_single, check_draws, make_workspace
 
 __all__ = ["DesignMode", "TabletopWorkspace"]
 
@@ -233,6 +235,7 @@ class TabletopWorkspace(Workspace):
         Raises:
             LayoutError: Two million draws in a row broke a rule: the rules leave (almost) no room.
         """
+        check_draws(rng, n=n)
         genomes = np.zeros((n, self.genome_size))
         first = 0
         if self._home is not None and n:
@@ -257,6 +260,7 @@ class TabletopWorkspace(Workspace):
         Objects vary in phase 0, obstacles in phase 1 (under ``"obstacles"`` in phase 0, the only one);
         :func:`.perturb_genomes` documents the changes. A parent that has no valid child repeats itself.
         """
+        check_draws(rng, k=k)
         choice("phase", phase, range(self.phases))
         parents = self._as_float(genomes)
         is_valid = self.valid(parents)
@@ -276,6 +280,7 @@ class TabletopWorkspace(Workspace):
 
     def simplifications(self, genome: npt.NDArray[Any]) -> Array:
         """``(m, d)`` the genome without one of its ``m`` obstacles."""
+        genome = as_single(genome, self.genome_size)[0]
         first = 2 * len(self.rules.movable)
         rows = np.asarray(genome, dtype=np.float64)[first:].reshape(-1, 4)
         there = rows[rows[:, 0] > 0.5]
@@ -284,6 +289,10 @@ class TabletopWorkspace(Workspace):
         for i in range(len(there)):
             simpler[i, first : first + 4 * (len(there) - 1)] = np.delete(there, i, axis=0).ravel()
         return simpler
+
+    def continuous(self) -> KeySpace:
+        """Tables as vectors of real numbers in [0, 1]; :class:`.TableKeys` documents what each key stands for."""
+        return KeySpace(self, TableKeys(self, self.rules))
 
     def _as_float(self, genomes: npt.ArrayLike) -> Array:
         return np.ascontiguousarray(as_batch(genomes, self.genome_size), dtype=np.float64)

@@ -84,7 +84,7 @@ def test_a_bad_registration_is_refused(name, factory, message):
         ("optimizers.errors:__all__", "not a class or function but a list"),
         (7, "a name, 'module:Class' or a callable"),
         (lambda archive: object(), "returned a object, which has no 'ask'"),
-        (lambda archive, workspace, seed, missing: None, "could not be called with archive, seed, workspace"),
+        (lambda archive, workspace, seed, missing: None, "needs the emitter option missing, without a default"),
     ],
 )
 def test_an_emitter_that_cannot_be_had_is_explained(spec, message):
