@@ -3,25 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final, Literal
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import CUTS, Cut, Trajectory
-from legible_envs.support.validation import choice, integer, is_integer, is_real
-from predictors.base import FRACTIONS, GoalPredictor, TieCredit, correctness
+from legible_envs.support.validation import choice, entries, integer, is_integer, is_real, real, shown
+from predictors.base import (
+    FRACTIONS,
+    GoalPredictor,
+    TieCredit,
+    TrajectoryError,
+    check_fractions,
+    correctness,
+    prefix_lengths,
+)
 from predictors.evaluation.comparison import Comparison, compare_conditions
 from predictors.evaluation.metrics import tied_shares
+from predictors.evaluation.omissions import Omission, no_predictor_left, omission_table
 from predictors.evaluation.results import Evaluation, LearningCurve
 from predictors.evaluation.splits import (
     Groups,
+    Rare,
     Split,
-    check_candidate_sets,
+    check_evaluable,
+    check_groups,
     check_learnable,
+    check_seed,
     folds,
     nested_training_sets,
 )
+from predictors.outputs import probability_fault
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -67,11 +81,16 @@ def accuracy_at(
         true goal) and ``correct`` (0 to 1). ``.attrs`` holds ``cut``, ``definition``, ``ties`` and ``candidate_set``.
 
     Raises:
-        ValueError: Prefixes, unknown goals, or mixed candidate sets, whose accuracies must not be averaged.
+        PredictorError: The predictor's answer is no probabilities of the candidates.
+        ValueError: Prefixes, unknown goals, mixed candidate sets, whose accuracies must not be averaged, or bad
+            fractions.
     """
-    trajectories = list(X)
-    candidate_set = check_candidate_sets(trajectories)
-    probabilities = predictor.predict_proba_at(trajectories, fractions, cut)
+    trajectories, fractions = list(X), check_fractions(fractions, cut, distinct=True)
+    choice("ties", ties, get_args(TieCredit))
+    if trajectories:
+        check_evaluable(trajectories)
+    candidate_set = trajectories[0].candidate_set if trajectories else None
+    probabilities = _probabilities(type(predictor).__name__, predictor, trajectories, fractions, cut)
     table = _rows(trajectories, probabilities, predictor.goal_columns(trajectories), fractions, cut, ties)
     table.attrs.update(cut=cut, definition=CUTS[cut], ties=ties, candidate_set=candidate_set)
     return table
@@ -124,12 +143,16 @@ def evaluate(
     ties: TieCredit = "fractional",
     groups: Groups | None = None,
     by: Part | None = None,
-    rare: Literal["error", "keep"] = "error",
+    rare: Rare = "error",
     seed: int | np.random.Generator = 0,
 ) -> Evaluation:
     """Evaluate predictors by stratified cross-validation: every trajectory is predicted once per repeat, unseen.
 
-    All predictors see the same splits.
+    All predictors see the same splits. A predictor that cannot be evaluated on these trajectories is left out, with the
+    reason in ``omitted``, and the results of the others stand: one that learns, where all people chose one goal or
+    there is no way to split the trajectories; and one that refuses them, such as a predictor of reaches in a kitchen. A
+    predictor that learns nothing (:attr:`~predictors.base.GoalPredictor.learns`) needs no splits; where there are none,
+    it is told the goals, starts and layouts only, and its rows have fold 0.
 
     Args:
         predictors: One predictor or several: instances, registered names, ``"module:Class"`` or classes; a mapping
@@ -142,45 +165,44 @@ def evaluate(
         ties: How a true goal that shares the top counts; see :func:`predictors.base.correctness`.
         groups: ``"participant"``: no participant is on both sides of a split. None: trajectories are split singly.
         by: ``"condition"`` or ``"layout"``: fit and evaluate within each apart, as for comparing layouts.
-        rare: ``"error"`` refuses goals with fewer examples than folds; ``"keep"`` evaluates on them all the same.
+        rare: What keeps predictors from learning: with ``"error"`` goals with fewer examples than folds; ``"keep"``
+            evaluates on them all the same.
         seed: Of the splits.
 
     Returns:
         The result; its tables are tidy.
 
     Raises:
-        PredictorError: A predictor that cannot be found or made.
-        ValueError: Trajectories that cannot be split so, with the reason; unknown options.
+        PredictorError: A predictor that cannot be found or made, or whose answers are no probabilities.
+        TrajectoryError: A prefix, an unknown goal, or a trajectory that does not fit its kitchen.
+        ValueError: None of the predictors can be evaluated, with the reasons; bad parameters of one; no trajectories,
+            mixed candidate sets, unknown options.
         TypeError: Samples that are not trajectories.
     """
     import pandas as pd
-    from sklearn.base import clone
 
-    trajectories = list(X)
-    check_learnable(trajectories)
-    _check_options(fractions, cut, repeats)
+    trajectories, fractions = list(X), check_fractions(fractions, cut, distinct=True)
+    integer("cv", cv, 2, unit="folds")
+    integer("repeats", repeats, 1)
+    choice("rare", rare, get_args(Rare))
+    _check_trajectories(trajectories, fractions, cut, ties, groups)
     named = _named(predictors)
-    parts = _parts(trajectories, by)
-    rng = np.random.default_rng(seed)
-    tables, confusions = [], []
-    for part, members in parts.items():
-        for repeat in range(repeats):
-            try:
-                splits = list(folds([trajectories[i] for i in members], cv, rng, groups=groups, rare=rare))
-            except ValueError as error:
-                raise ValueError(f"{by} {part!r}: {error}" if by else str(error)) from error
-            for fold, (train, test) in enumerate(splits):
-                learned, held_out = ([trajectories[members[i]] for i in half] for half in (train, test))
-                for name, predictor in named.items():
-                    fitted = clone(predictor).fit(learned)
-                    rows, confusion = _predict_rows(fitted, held_out, fractions, cut, ties)
-                    rows["trajectory"] = members[test][rows["trajectory"].to_numpy()]
-                    labels = {"predictor": name, "repeat": repeat, "fold": fold}
-                    tables.append(_labelled(rows, labels))
-                    confusions.append(_labelled(confusion, labels | ({by: part} if by else {})))
+    rng = check_seed(seed)
+    plan = _Plan(cv, repeats, fractions, cut, ties, groups, rare)
+    results: list[_FoldResult] = []
+    omissions: list[Omission] = []
+    unsplit: dict[str, str] = {}
+    for part, members in _parts(trajectories, by).items():
+        found, reasons, no_splits = _cross_validate(named, trajectories, members, plan, rng)
+        if no_splits is not None and found:
+            unsplit[part] = no_splits
+        results += [result.of_part(by, part) for result in found]
+        omissions += [Omission(name, part, reason) for name, reason in reasons.items()]
+    if not results:
+        raise no_predictor_left(omissions, by)
     return Evaluation(
-        table=pd.concat(tables, ignore_index=True),
-        confusion=pd.concat(confusions, ignore_index=True),
+        table=pd.concat([result.rows for result in results], ignore_index=True),
+        confusion=pd.concat([result.confusion for result in results], ignore_index=True),
         cut=cut,
         ties=ties,
         candidate_set=trajectories[0].candidate_set,
@@ -188,15 +210,135 @@ def evaluate(
         repeats=repeats,
         groups=groups,
         by=by,
+        omitted=omission_table(omissions, by),
+        unsplit=unsplit,
     )
 
 
-def _check_options(fractions: Sequence[float], cut: Cut, repeats: int) -> None:
-    if cut not in CUTS:
-        raise ValueError(f"unknown cut {cut!r}; expected one of {list(CUTS)}")
-    if not len(fractions) or len(set(fractions)) != len(fractions):
-        raise ValueError(f"`fractions` must be at least one, each once, got {fractions!r}")
-    integer("repeats", repeats, 1)
+@dataclass(frozen=True)
+class _Plan:
+    """How predictors are evaluated; see :func:`evaluate`."""
+
+    cv: int
+    repeats: int
+    fractions: tuple[float, ...]
+    cut: Cut
+    ties: TieCredit
+    groups: Groups | None
+    rare: Rare
+
+
+class _FoldResult(NamedTuple):
+    """What one predictor said of the held-out part of one fold, as rows of the tables of an evaluation."""
+
+    rows: pd.DataFrame
+    confusion: pd.DataFrame
+
+    def of_part(self, by: Part | None, part: str) -> _FoldResult:
+        """The same, with a column that says which part of the trajectories this is."""
+        if by is not None:
+            self.confusion.insert(3, by, part)
+        return self
+
+
+def _check_trajectories(
+    trajectories: Sequence[Trajectory], fractions: Sequence[float], cut: Cut, ties: TieCredit, groups: Groups | None
+) -> None:
+    choice("ties", ties, get_args(TieCredit))
+    check_evaluable(trajectories)
+    check_groups(trajectories, groups)
+    prefix_lengths(trajectories, fractions, cut)
+
+
+def _cross_validate(
+    named: Mapping[str, GoalPredictor],
+    trajectories: Sequence[Trajectory],
+    members: npt.NDArray[np.intp],
+    plan: _Plan,
+    rng: np.random.Generator,
+) -> tuple[list[_FoldResult], dict[str, str], str | None]:
+    """Results on some of the trajectories, why predictors have none, and why there are no folds."""
+    results: dict[str, list[tuple[int, _FoldResult]]] = {name: [] for name in named}
+    reasons: dict[str, str] = {}
+    unsplit: str | None = None
+    place = 0
+    for repeat in range(plan.repeats):
+        splits, no_splits = _splits_or_reason([trajectories[i] for i in members], plan, rng)
+        unsplit = unsplit or no_splits
+        for fold, (train, test) in enumerate(splits):
+            for name, predictor in named.items():
+                if no_splits is not None and predictor.learns:
+                    reasons.setdefault(name, no_splits)
+                if name in reasons:
+                    continue
+                try:
+                    fitted = _fit(predictor, trajectories, members[train], contexts=no_splits is not None)
+                    rows, confusion = _predict_rows(name, fitted, trajectories, members[test], plan)
+                except _contract_errors():
+                    raise
+                except ValueError as error:
+                    reasons[name] = str(error)
+                    continue
+                labels = {"predictor": name, "repeat": repeat, "fold": fold}
+                results[name].append((place, _FoldResult(_labelled(rows, labels), _labelled(confusion, labels))))
+                place += 1
+    kept = [each for name, found in results.items() if name not in reasons for each in found]
+    return [result for _, result in sorted(kept, key=lambda each: each[0])], reasons, unsplit
+
+
+def _splits_or_reason(
+    trajectories: Sequence[Trajectory], plan: _Plan, rng: np.random.Generator
+) -> tuple[list[Split], str | None]:
+    """The folds; or a single one of all trajectories, and why they cannot be split."""
+    try:
+        return list(folds(trajectories, plan.cv, rng, groups=plan.groups, rare=plan.rare)), None
+    except ValueError as error:
+        every = np.arange(len(trajectories))
+        return [(every, every)], str(error)
+
+
+def _contract_errors() -> type[Exception]:
+    """What a broken predictor raises, which is no fact of the data."""
+    from predictors.registry import PredictorError
+
+    return PredictorError
+
+
+def _fit(
+    predictor: GoalPredictor,
+    trajectories: Sequence[Trajectory],
+    numbers: npt.NDArray[np.intp],
+    *,
+    contexts: bool = False,
+) -> GoalPredictor:
+    """A fitted copy; with ``contexts`` it is shown what is known before anybody moves only."""
+    from sklearn.base import clone
+
+    learned = [trajectories[i] for i in numbers]
+    try:
+        return clone(predictor).fit([replace(one.first(0), goal=None) for one in learned] if contexts else learned)
+    except TrajectoryError as error:
+        raise _renumbered(error, numbers) from error
+
+
+def _renumbered(error: TrajectoryError, numbers: npt.NDArray[np.intp]) -> TrajectoryError:
+    """An error about a part of the trajectories, with the number among all."""
+    return TrajectoryError(int(numbers[error.number]), error.participant, error.reason)
+
+
+def _probabilities(
+    name: str, predictor: GoalPredictor, trajectories: Sequence[Trajectory], fractions: Sequence[float], cut: Cut
+) -> npt.NDArray[np.float64]:
+    """``(n, F, K)`` what a predictor says, if these are probabilities.
+
+    Raises:
+        PredictorError: They are not.
+    """
+    probabilities = predictor.predict_proba_at(trajectories, fractions, cut)
+    fault = probability_fault(probabilities, trajectories, predictor.classes_, (len(fractions),))
+    if fault:
+        raise _contract_errors()(f"predictor {name!r}: {fault}")
+    return probabilities
 
 
 def _named(specs: Specs) -> dict[str, GoalPredictor]:
@@ -205,6 +347,8 @@ def _named(specs: Specs) -> dict[str, GoalPredictor]:
 
     if isinstance(specs, Mapping):
         named = {str(name): make_predictor(spec) for name, spec in specs.items()}
+        if len(named) < len(specs):
+            raise ValueError(f"several predictors have the same name in {list(specs)}")
     else:
         listed: Sequence[Spec] = [specs] if isinstance(specs, str | GoalPredictor) or callable(specs) else list(specs)
         named = {}
@@ -216,6 +360,11 @@ def _named(specs: Specs) -> dict[str, GoalPredictor]:
             named[name] = made
     if not named:
         raise ValueError("no predictors to evaluate")
+    for name, predictor in named.items():
+        try:
+            predictor._check_parameters()
+        except ValueError as error:
+            raise ValueError(f"predictor {name!r}: {error}") from error
     return named
 
 
@@ -232,18 +381,27 @@ def _parts(trajectories: Sequence[Trajectory], by: Part | None) -> dict[str, npt
 
 
 def _predict_rows(
-    predictor: GoalPredictor, trajectories: Sequence[Trajectory], fractions: Sequence[float], cut: Cut, ties: TieCredit
+    name: str,
+    predictor: GoalPredictor,
+    trajectories: Sequence[Trajectory],
+    numbers: npt.NDArray[np.intp],
+    plan: _Plan,
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Rows as of :func:`accuracy_at` with ``confidence``, and confusions as ``fraction, goal, predicted, count``."""
     import pandas as pd
 
-    probabilities = predictor.predict_proba_at(trajectories, fractions, cut)
-    goals = predictor.goal_columns(trajectories)
-    rows = _rows(trajectories, probabilities, goals, fractions, cut, ties)
+    held_out, fractions = [trajectories[i] for i in numbers], plan.fractions
+    try:
+        probabilities = _probabilities(name, predictor, held_out, fractions, plan.cut)
+        goals = predictor.goal_columns(held_out)
+    except TrajectoryError as error:
+        raise _renumbered(error, numbers) from error
+    rows = _rows(held_out, probabilities, goals, fractions, plan.cut, plan.ties)
+    rows["trajectory"] = numbers[rows["trajectory"].to_numpy()]
     rows["confidence"] = probabilities.max(axis=-1).ravel()
     names = np.asarray(predictor.classes_)
     counts = np.zeros((len(fractions), len(names), len(names)))
-    for goal, shares in zip(goals, tied_shares(probabilities, ties), strict=True):
+    for goal, shares in zip(goals, tied_shares(probabilities, plan.ties), strict=True):
         counts[:, goal] += shares
     where = np.nonzero(counts)
     confusion = pd.DataFrame(
@@ -283,7 +441,7 @@ def learning_curve(
     """How accuracy grows with the number of trajectories learned from.
 
     In each repeat a fixed share is held out to evaluate on; training sets are nested, and without groups hold goals in
-    proportion.
+    proportion. Predictors that cannot be evaluated are left out, as by :func:`evaluate`.
 
     Args:
         predictors: As for :func:`evaluate`.
@@ -296,39 +454,81 @@ def learning_curve(
         cut: What the fraction is a share of, a key of :data:`legible_envs.rollouts.CUTS`.
         ties: As for :func:`evaluate`.
         groups: As for :func:`evaluate`.
-        rare: ``"error"`` refuses splits whose smallest training set never mentions a goal that is held out;
-            ``"redraw"`` draws splits until it mentions every goal (without groups only).
+        rare: What keeps predictors from learning: with ``"error"`` a smallest training set that never mentions a goal
+            that is held out; ``"redraw"`` draws splits until it mentions every goal (without groups only).
         seed: Of the splits.
 
     Raises:
-        ValueError: Sizes that are no sizes or larger than what is left to learn from; goals that the smallest training
-            set does not mention, nor hardly any other split would; and as for :func:`evaluate`.
+        ValueError: Sizes that are no sizes or larger than what is left to learn from; and as for :func:`evaluate`.
     """
     import pandas as pd
-    from sklearn.base import clone
 
-    trajectories = list(X)
-    check_learnable(trajectories)
-    _check_options(fractions, cut, repeats)
+    trajectories, fractions = list(X), check_fractions(fractions, cut, distinct=True)
+    integer("repeats", repeats, 1)
+    real("test_share", test_share, 0, 1, closed="neither")
+    choice("rare", rare, ("error", "redraw"))
+    _check_trajectories(trajectories, fractions, cut, ties, groups)
     named = _named(predictors)
-    rng = np.random.default_rng(seed)
-    rows = []
-    splits = _splits(trajectories, sizes, test_share, repeats, rng, groups, rare)
+    rng = check_seed(seed)
+    reasons: dict[str, str] = {}
+    try:
+        splits = _splits(trajectories, sizes, test_share, repeats, rng, groups, rare)
+    except _Unlearnable as error:
+        reasons = {name: str(error) for name, predictor in named.items() if predictor.learns}
+        splits = [nested_training_sets(trajectories, test_share, rng, groups) for _ in range(repeats)]
     # Groups are of different sizes: the smallest pool decides, so that every repeat has the same training sizes.
     counts = _sizes(sizes, min(len(pool) for pool, _ in splits))
+    rows = []
     for repeat, (pool, test) in enumerate(splits):
         held_out = [trajectories[i] for i in test]
         for size in counts:
-            learned = [trajectories[i] for i in pool[:size]]
-            _check_known(learned, held_out)
+            unknown = _unknown_goals([trajectories[i] for i in pool[:size]], held_out)
             for name, predictor in named.items():
-                fitted = clone(predictor).fit(learned)
-                probabilities = fitted.predict_proba_at(held_out, fractions, cut)
-                correct = correctness(probabilities, fitted.goal_columns(held_out), ties).mean(axis=0)
+                if unknown and predictor.learns:
+                    reasons.setdefault(name, unknown)
+                if name in reasons:
+                    continue
+                try:
+                    learned = np.arange(len(trajectories)) if unknown else pool[:size]
+                    fitted = _fit(predictor, trajectories, learned, contexts=unknown is not None)
+                    correct = _accuracies(name, fitted, trajectories, test, fractions, cut, ties)
+                except _contract_errors():
+                    raise
+                except ValueError as error:
+                    reasons[name] = str(error)
+                    continue
                 for fraction, accuracy in zip(fractions, correct, strict=True):
                     rows.append((name, repeat, size, len(held_out), float(fraction), float(accuracy)))
+    omissions = [Omission(name, "", reason) for name, reason in reasons.items()]
+    rows = [row for row in rows if row[0] not in reasons]
+    if not rows:
+        raise no_predictor_left(omissions)
     columns = ["predictor", "repeat", "size", "judged", "fraction", "accuracy"]
-    return LearningCurve(pd.DataFrame(rows, columns=columns), cut, ties, trajectories[0].candidate_set, test_share)
+    table = pd.DataFrame(rows, columns=columns)
+    candidate_set = trajectories[0].candidate_set
+    return LearningCurve(table, cut, ties, candidate_set, test_share, omission_table(omissions))
+
+
+def _accuracies(
+    name: str,
+    predictor: GoalPredictor,
+    trajectories: Sequence[Trajectory],
+    numbers: npt.NDArray[np.intp],
+    fractions: Sequence[float],
+    cut: Cut,
+    ties: TieCredit,
+) -> npt.NDArray[np.float64]:
+    """``(F,)`` mean accuracy on some of the trajectories."""
+    held_out = [trajectories[i] for i in numbers]
+    try:
+        probabilities = _probabilities(name, predictor, held_out, fractions, cut)
+    except TrajectoryError as error:
+        raise _renumbered(error, numbers) from error
+    return correctness(probabilities, predictor.goal_columns(held_out), ties).mean(axis=0)
+
+
+class _Unlearnable(ValueError):
+    """Nothing can be learned from these trajectories, or from any split of them that was tried."""
 
 
 def _splits(
@@ -341,9 +541,12 @@ def _splits(
     rare: str,
 ) -> list[Split]:
     """Pools to learn from and test sets, one pair per repeat."""
+    try:
+        check_learnable(trajectories)
+    except ValueError as error:
+        raise _Unlearnable(str(error)) from error
     if rare == "error":
         return [nested_training_sets(trajectories, test_share, rng, groups) for _ in range(repeats)]
-    choice("rare", rare, ("error", "redraw"))
     if groups is not None:
         raise ValueError("rare='redraw' draws splits of single trajectories; use groups=None")
     names = {name for trajectory in trajectories for name in trajectory.candidates}
@@ -355,26 +558,29 @@ def _splits(
             found.append((pool, test))
         if len(found) == repeats:
             return found
-    raise ValueError(
+    raise _Unlearnable(
         f"in only {len(found)} of {_REDRAWS} splits the {least} trajectories learned from mention every goal; "
         f"{repeats} are needed: begin with a larger size"
     )
 
 
 def _sizes(sizes: Sequence[int | float], available: int) -> list[int]:
+    listed = entries(sizes)
+    if not listed:
+        raise ValueError(f"`sizes` must name at least one training size, got {shown(sizes)}")
     found = []
-    for size in sizes:
+    for size in listed:
         count = size if is_integer(size) else round(size * available) if is_real(size) and 0 < size <= 1 else 0
         if not 1 <= count <= available:
             raise ValueError(f"size {size!r} is neither 1..{available} trajectories nor a share in (0, 1] of them")
         found.append(int(count))
-    if not found:
-        raise ValueError("`sizes` must name at least one training size")
     return sorted(set(found))
 
 
-def _check_known(learned: Sequence[Trajectory], held_out: Sequence[Trajectory]) -> None:
+def _unknown_goals(learned: Sequence[Trajectory], held_out: Sequence[Trajectory]) -> str | None:
+    """Why nothing can be said of the held-out trajectories after these; None if all their goals are known."""
     known = {name for trajectory in learned for name in trajectory.candidates}
     unknown = sorted({name for trajectory in held_out for name in trajectory.candidates} - known)
-    if unknown:
-        raise ValueError(f"{len(learned)} trajectories to learn from never mention goals {unknown}; use larger sizes")
+    if not unknown:
+        return None
+    return f"{len(learned)} trajectories to learn from never mention goals {unknown}; use larger sizes"
