@@ -456,6 +456,9 @@ class GoalStream:
         if isinstance(point, np.ma.MaskedArray) and np.ma.is_masked(point):
             array = np.zeros((0, 0))
         is_cell = grid_kind(array.dtype)
+        if is_cell is False:
+            with np.errstate(over="ignore"):  # of numbers beyond double precision, refused as infinite
+                array = array.astype(np.float64)
         if array.ndim != 1 or not len(array) or is_cell is None or not np.isfinite(array).all():
             raise ValueError(f"expected one finite point of shape (d,), got {shown(point)}")
         if self._points and len(self._points[-1]) != len(array):
@@ -469,7 +472,7 @@ class GoalStream:
                 f"expected a point that is a cell (integers), got {shown(point)}; where points are positions, give "
                 "floats from the first one on"
             )
-        if self._cells is False:
+        if self._cells is False and is_cell:
             array, is_cell = array.astype(np.float64), False
         return tuple(array.tolist()), is_cell
 

@@ -245,7 +245,10 @@ def _checked_states(states: npt.ArrayLike) -> npt.NDArray[Any]:
     is_grid = grid_kind(array.dtype)
     if is_grid is None:
         raise ValueError(f"states must be integers (cells) or floats (positions), got dtype {array.dtype}")
-    # The bounds come first: a number beyond those of the new dtype would become another one.
+    # The bounds come before a narrower dtype, in which a number would become another one; and after a wider one, as
+    # they would be infinite themselves in half precision.
+    if not is_grid and array.dtype.itemsize < 8:
+        array = array.astype(np.float64)
     bad = np.argwhere(~((array >= -LARGEST_COORDINATE) & (array <= LARGEST_COORDINATE)))
     if len(bad):
         row, column = bad[0]
