@@ -23,8 +23,8 @@ __all__ = ["BayesianGoalPredictor"]
 Costs = Literal["hard", "soft"]
 CellCosts = Literal["uniform", "learned"] | MaxEntIRL | npt.NDArray[np.float64]
 
-LARGEST_BETA: Final = 1e100
-"""Beyond this, costs times ``beta`` would no longer be finite."""
+LARGEST_BETA: Final = 1e9
+"""A path that costs one step more is then impossible by any standard; beyond it, kernels take costs for infinite."""
 
 _MARGIN: Final = 0.25
 

@@ -132,7 +132,7 @@ def test_an_error_is_about_the_trajectory_that_was_given() -> None:
         (MaxEntIRL(max_iter=0.5), "`max_iter` must be an integer"),  # type: ignore[arg-type]
         (MaxEntIRL(prior="flat"), "`prior`"),  # type: ignore[arg-type]
         (BayesianGoalPredictor(prior="flat"), "`prior`"),  # type: ignore[arg-type]
-        (BayesianGoalPredictor(beta=1e200), r"`beta` must be .* 1e\+100"),
+        (BayesianGoalPredictor(beta=1e200), r"`beta` must be .* 1e\+09"),
         (ShortestDistance("diagonal"), "`metric`"),  # type: ignore[arg-type]
         (StraightLineBayesian(obstacles=1), "`obstacles` must be True or False"),  # type: ignore[arg-type]
         (TimeSeriesGaussian(velocity=1), "`velocity` must be True or False"),  # type: ignore[arg-type]
@@ -409,3 +409,11 @@ def test_odd_cells_get_probabilities_or_a_reason(case: Case, data: st.DataObject
     count = len(predictor.classes_)
     answers(lambda: predictor.predict_proba([found]), (1, count))
     answers(lambda: predictor.predict_proba_at([found]), (1, 9, count))
+
+
+@pytest.mark.parametrize("costs", ["hard", "soft"])
+def test_the_largest_beta_is_that_of_people_who_never_stray(costs: Any) -> None:
+    predictor = BayesianGoalPredictor(1e9, costs=costs).fit(people())
+    way = people()[0]
+    rows = predictor.predict_proba([way.first(1), way.first(2), way])
+    assert rows[:, predictor.classes_.tolist().index("onion")].tolist() == [1 / 3, 1.0, 1.0]
