@@ -2,40 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, get_args
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import CUTS, Cut, Trajectory
-from legible_envs.support.validation import choice, entries, integer, is_integer, is_real, real, shown
-from predictors.base import (
-    FRACTIONS,
-    GoalPredictor,
-    TieCredit,
-    TrajectoryError,
-    check_fractions,
-    correctness,
-    prefix_lengths,
+from legible_envs.support.validation import choice, integer
+from predictors.base import FRACTIONS, GoalPredictor, TieCredit, TrajectoryError, check_fractions, correctness
+from predictors.evaluation.answers import (
+    Specs,
+    check_input,
+    contract_error,
+    fitted_on,
+    named_predictors,
+    probabilities_of,
+    renumbered,
 )
 from predictors.evaluation.comparison import Comparison, compare_conditions
+from predictors.evaluation.learning_curves import learning_curve
 from predictors.evaluation.metrics import tied_shares
 from predictors.evaluation.omissions import Omission, no_predictor_left, omission_table
 from predictors.evaluation.results import Evaluation, LearningCurve
-from predictors.evaluation.splits import (
-    Groups,
-    Rare,
-    Split,
-    check_evaluable,
-    check_groups,
-    check_learnable,
-    check_seed,
-    folds,
-    nested_training_sets,
-)
-from predictors.outputs import probability_fault
+from predictors.evaluation.splits import Groups, Rare, Split, check_evaluable, check_seed, folds
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -50,12 +41,7 @@ __all__ = [
     "learning_curve",
 ]
 
-Spec = str | GoalPredictor | Callable[..., GoalPredictor]
-Specs = Spec | Sequence[Spec] | Mapping[str, Spec]
 Part = Literal["condition", "layout"]
-
-_REDRAWS: Final = 1000
-"""How many splits are drawn to find those whose smallest training set mentions every goal."""
 
 
 def accuracy_at(
@@ -90,7 +76,7 @@ def accuracy_at(
     if trajectories:
         check_evaluable(trajectories)
     candidate_set = trajectories[0].candidate_set if trajectories else None
-    probabilities = _probabilities(type(predictor).__name__, predictor, trajectories, fractions, cut)
+    probabilities = probabilities_of(type(predictor).__name__, predictor, trajectories, fractions, cut)
     table = _rows(trajectories, probabilities, predictor.goal_columns(trajectories), fractions, cut, ties)
     table.attrs.update(cut=cut, definition=CUTS[cut], ties=ties, candidate_set=candidate_set)
     return table
@@ -185,8 +171,8 @@ def evaluate(
     integer("cv", cv, 2, unit="folds")
     integer("repeats", repeats, 1)
     choice("rare", rare, get_args(Rare))
-    _check_trajectories(trajectories, fractions, cut, ties, groups)
-    named = _named(predictors)
+    check_input(trajectories, fractions, cut, ties, groups)
+    named = named_predictors(predictors)
     rng = check_seed(seed)
     plan = _Plan(cv, repeats, fractions, cut, ties, groups, rare)
     results: list[_FoldResult] = []
@@ -241,15 +227,6 @@ class _FoldResult(NamedTuple):
         return self
 
 
-def _check_trajectories(
-    trajectories: Sequence[Trajectory], fractions: Sequence[float], cut: Cut, ties: TieCredit, groups: Groups | None
-) -> None:
-    choice("ties", ties, get_args(TieCredit))
-    check_evaluable(trajectories)
-    check_groups(trajectories, groups)
-    prefix_lengths(trajectories, fractions, cut)
-
-
 def _cross_validate(
     named: Mapping[str, GoalPredictor],
     trajectories: Sequence[Trajectory],
@@ -272,9 +249,9 @@ def _cross_validate(
                 if name in reasons:
                     continue
                 try:
-                    fitted = _fit(predictor, trajectories, members[train], contexts=no_splits is not None)
+                    fitted = fitted_on(predictor, trajectories, members[train], contexts=no_splits is not None)
                     rows, confusion = _predict_rows(name, fitted, trajectories, members[test], plan)
-                except _contract_errors():
+                except contract_error():
                     raise
                 except ValueError as error:
                     reasons[name] = str(error)
@@ -295,77 +272,6 @@ def _splits_or_reason(
     except ValueError as error:
         every = np.arange(len(trajectories))
         return [(every, every)], str(error)
-
-
-def _contract_errors() -> type[Exception]:
-    """What a broken predictor raises, which is no fact of the data."""
-    from predictors.registry import PredictorError
-
-    return PredictorError
-
-
-def _fit(
-    predictor: GoalPredictor,
-    trajectories: Sequence[Trajectory],
-    numbers: npt.NDArray[np.intp],
-    *,
-    contexts: bool = False,
-) -> GoalPredictor:
-    """A fitted copy; with ``contexts`` it is shown what is known before anybody moves only."""
-    from sklearn.base import clone
-
-    learned = [trajectories[i] for i in numbers]
-    try:
-        return clone(predictor).fit([replace(one.first(0), goal=None) for one in learned] if contexts else learned)
-    except TrajectoryError as error:
-        raise _renumbered(error, numbers) from error
-
-
-def _renumbered(error: TrajectoryError, numbers: npt.NDArray[np.intp]) -> TrajectoryError:
-    """An error about a part of the trajectories, with the number among all."""
-    return TrajectoryError(int(numbers[error.number]), error.participant, error.reason)
-
-
-def _probabilities(
-    name: str, predictor: GoalPredictor, trajectories: Sequence[Trajectory], fractions: Sequence[float], cut: Cut
-) -> npt.NDArray[np.float64]:
-    """``(n, F, K)`` what a predictor says, if these are probabilities.
-
-    Raises:
-        PredictorError: They are not.
-    """
-    probabilities = predictor.predict_proba_at(trajectories, fractions, cut)
-    fault = probability_fault(probabilities, trajectories, predictor.classes_, (len(fractions),))
-    if fault:
-        raise _contract_errors()(f"predictor {name!r}: {fault}")
-    return probabilities
-
-
-def _named(specs: Specs) -> dict[str, GoalPredictor]:
-    """Predictors by the names that tables use."""
-    from predictors.registry import make_predictor
-
-    if isinstance(specs, Mapping):
-        named = {str(name): make_predictor(spec) for name, spec in specs.items()}
-        if len(named) < len(specs):
-            raise ValueError(f"several predictors have the same name in {list(specs)}")
-    else:
-        listed: Sequence[Spec] = [specs] if isinstance(specs, str | GoalPredictor) or callable(specs) else list(specs)
-        named = {}
-        for spec in listed:
-            made = make_predictor(spec)
-            name = spec if isinstance(spec, str) else type(made).__name__
-            if name in named:
-                raise ValueError(f"several predictors are called {name!r}; give a mapping of names to predictors")
-            named[name] = made
-    if not named:
-        raise ValueError("no predictors to evaluate")
-    for name, predictor in named.items():
-        try:
-            predictor._check_parameters()
-        except ValueError as error:
-            raise ValueError(f"predictor {name!r}: {error}") from error
-    return named
 
 
 def _parts(trajectories: Sequence[Trajectory], by: Part | None) -> dict[str, npt.NDArray[np.intp]]:
@@ -392,10 +298,10 @@ def _predict_rows(
 
     held_out, fractions = [trajectories[i] for i in numbers], plan.fractions
     try:
-        probabilities = _probabilities(name, predictor, held_out, fractions, plan.cut)
+        probabilities = probabilities_of(name, predictor, held_out, fractions, plan.cut)
         goals = predictor.goal_columns(held_out)
     except TrajectoryError as error:
-        raise _renumbered(error, numbers) from error
+        raise renumbered(error, numbers) from error
     rows = _rows(held_out, probabilities, goals, fractions, plan.cut, plan.ties)
     rows["trajectory"] = numbers[rows["trajectory"].to_numpy()]
     rows["confidence"] = probabilities.max(axis=-1).ravel()
@@ -419,168 +325,3 @@ def _labelled(table: pd.DataFrame, labels: Mapping[str, Any]) -> pd.DataFrame:
     for place, (name, value) in enumerate(labels.items()):
         table.insert(place, name, value)
     return table
-
-
-# -- learning curves --------------------------------------------------------------------------------------------------
-
-
-def learning_curve(
-    predictors: Specs,
-    X: Sequence[Trajectory],
-    *,
-    sizes: Sequence[int | float] = (0.1, 0.2, 0.4, 0.7, 1.0),
-    test_share: float = 0.25,
-    repeats: int = 5,
-    fractions: Sequence[float] = FRACTIONS,
-    cut: Cut = "steps",
-    ties: TieCredit = "fractional",
-    groups: Groups | None = None,
-    rare: Literal["error", "redraw"] = "error",
-    seed: int | np.random.Generator = 0,
-) -> LearningCurve:
-    """How accuracy grows with the number of trajectories learned from.
-
-    In each repeat a fixed share is held out to evaluate on; training sets are nested, and without groups hold goals in
-    proportion. Predictors that cannot be evaluated are left out, as by :func:`evaluate`.
-
-    Args:
-        predictors: As for :func:`evaluate`.
-        X: Complete trajectories with known goals.
-        sizes: Training sizes: whole numbers of trajectories, or shares (floats <= 1) of those not held out
-            (with groups, of the fewest in any repeat).
-        test_share: Share held out.
-        repeats: How often, with other splits.
-        fractions: Fractions observed.
-        cut: What the fraction is a share of, a key of :data:`legible_envs.rollouts.CUTS`.
-        ties: As for :func:`evaluate`.
-        groups: As for :func:`evaluate`.
-        rare: What keeps predictors from learning: with ``"error"`` a smallest training set that never mentions a goal
-            that is held out; ``"redraw"`` draws splits until it mentions every goal (without groups only).
-        seed: Of the splits.
-
-    Raises:
-        ValueError: Sizes that are no sizes or larger than what is left to learn from; and as for :func:`evaluate`.
-    """
-    import pandas as pd
-
-    trajectories, fractions = list(X), check_fractions(fractions, cut, distinct=True)
-    integer("repeats", repeats, 1)
-    real("test_share", test_share, 0, 1, closed="neither")
-    choice("rare", rare, ("error", "redraw"))
-    _check_trajectories(trajectories, fractions, cut, ties, groups)
-    named = _named(predictors)
-    rng = check_seed(seed)
-    reasons: dict[str, str] = {}
-    try:
-        splits = _splits(trajectories, sizes, test_share, repeats, rng, groups, rare)
-    except _Unlearnable as error:
-        reasons = {name: str(error) for name, predictor in named.items() if predictor.learns}
-        splits = [nested_training_sets(trajectories, test_share, rng, groups) for _ in range(repeats)]
-    # Groups are of different sizes: the smallest pool decides, so that every repeat has the same training sizes.
-    counts = _sizes(sizes, min(len(pool) for pool, _ in splits))
-    rows = []
-    for repeat, (pool, test) in enumerate(splits):
-        held_out = [trajectories[i] for i in test]
-        for size in counts:
-            unknown = _unknown_goals([trajectories[i] for i in pool[:size]], held_out)
-            for name, predictor in named.items():
-                if unknown and predictor.learns:
-                    reasons.setdefault(name, unknown)
-                if name in reasons:
-                    continue
-                try:
-                    learned = np.arange(len(trajectories)) if unknown else pool[:size]
-                    fitted = _fit(predictor, trajectories, learned, contexts=unknown is not None)
-                    correct = _accuracies(name, fitted, trajectories, test, fractions, cut, ties)
-                except _contract_errors():
-                    raise
-                except ValueError as error:
-                    reasons[name] = str(error)
-                    continue
-                for fraction, accuracy in zip(fractions, correct, strict=True):
-                    rows.append((name, repeat, size, len(held_out), float(fraction), float(accuracy)))
-    omissions = [Omission(name, "", reason) for name, reason in reasons.items()]
-    rows = [row for row in rows if row[0] not in reasons]
-    if not rows:
-        raise no_predictor_left(omissions)
-    columns = ["predictor", "repeat", "size", "judged", "fraction", "accuracy"]
-    table = pd.DataFrame(rows, columns=columns)
-    candidate_set = trajectories[0].candidate_set
-    return LearningCurve(table, cut, ties, candidate_set, test_share, omission_table(omissions))
-
-
-def _accuracies(
-    name: str,
-    predictor: GoalPredictor,
-    trajectories: Sequence[Trajectory],
-    numbers: npt.NDArray[np.intp],
-    fractions: Sequence[float],
-    cut: Cut,
-    ties: TieCredit,
-) -> npt.NDArray[np.float64]:
-    """``(F,)`` mean accuracy on some of the trajectories."""
-    held_out = [trajectories[i] for i in numbers]
-    try:
-        probabilities = _probabilities(name, predictor, held_out, fractions, cut)
-    except TrajectoryError as error:
-        raise _renumbered(error, numbers) from error
-    return correctness(probabilities, predictor.goal_columns(held_out), ties).mean(axis=0)
-
-
-class _Unlearnable(ValueError):
-    """Nothing can be learned from these trajectories, or from any split of them that was tried."""
-
-
-def _splits(
-    trajectories: Sequence[Trajectory],
-    sizes: Sequence[int | float],
-    test_share: float,
-    repeats: int,
-    rng: np.random.Generator,
-    groups: Groups | None,
-    rare: str,
-) -> list[Split]:
-    """Pools to learn from and test sets, one pair per repeat."""
-    try:
-        check_learnable(trajectories)
-    except ValueError as error:
-        raise _Unlearnable(str(error)) from error
-    if rare == "error":
-        return [nested_training_sets(trajectories, test_share, rng, groups) for _ in range(repeats)]
-    if groups is not None:
-        raise ValueError("rare='redraw' draws splits of single trajectories; use groups=None")
-    names = {name for trajectory in trajectories for name in trajectory.candidates}
-    found: list[Split] = []
-    for seed in rng.integers(2**31, size=_REDRAWS).tolist():
-        pool, test = nested_training_sets(trajectories, test_share, np.random.default_rng(seed))
-        least = _sizes(sizes, len(pool))[0]
-        if {name for i in pool[:least] for name in trajectories[i].candidates} == names:
-            found.append((pool, test))
-        if len(found) == repeats:
-            return found
-    raise _Unlearnable(
-        f"in only {len(found)} of {_REDRAWS} splits the {least} trajectories learned from mention every goal; "
-        f"{repeats} are needed: begin with a larger size"
-    )
-
-
-def _sizes(sizes: Sequence[int | float], available: int) -> list[int]:
-    listed = entries(sizes)
-    if not listed:
-        raise ValueError(f"`sizes` must name at least one training size, got {shown(sizes)}")
-    found = []
-    for size in listed:
-        count = size if is_integer(size) else round(size * available) if is_real(size) and 0 < size <= 1 else 0
-        if not 1 <= count <= available:
-            raise ValueError(f"size {size!r} is neither 1..{available} trajectories nor a share in (0, 1] of them")
-        found.append(int(count))
-    return sorted(set(found))
-
-
-def _unknown_goals(learned: Sequence[Trajectory], held_out: Sequence[Trajectory]) -> str | None:
-    """Why nothing can be said of the held-out trajectories after these; None if all their goals are known."""
-    known = {name for trajectory in learned for name in trajectory.candidates}
-    unknown = sorted({name for trajectory in held_out for name in trajectory.candidates} - known)
-    if not unknown:
-        return None
-    return f"{len(learned)} trajectories to learn from never mention goals {unknown}; use larger sizes"
