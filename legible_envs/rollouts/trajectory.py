@@ -157,7 +157,9 @@ class Trajectory:
         """Number of states in :meth:`prefix`."""
         if cut not in CUTS:
             raise ValueError(f"unknown cut {cut!r}; expected one of {list(CUTS)}")
-        if not is_real(fraction) or not 0 <= fraction <= 1 or (fraction == 0 and cut == "steps"):
+        # Asked for every trajectory and fraction: a plain float, the usual case, is looked at once.
+        is_number = type(fraction) is float or is_real(fraction)
+        if not is_number or not 0 <= fraction <= 1 or (fraction == 0 and cut == "steps"):
             raise ValueError(f"`fraction` must be in {'(0, 1]' if cut == 'steps' else '[0, 1]'}, got {shown(fraction)}")
         if not self.complete:
             raise ValueError("a fraction of a prefix has no meaning; cut the complete trajectory")

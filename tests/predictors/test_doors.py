@@ -417,3 +417,22 @@ def test_the_largest_beta_is_that_of_people_who_never_stray(costs: Any) -> None:
     way = people()[0]
     rows = predictor.predict_proba([way.first(1), way.first(2), way])
     assert rows[:, predictor.classes_.tolist().index("onion")].tolist() == [1 / 3, 1.0, 1.0]
+
+
+def test_what_was_found_right_is_no_excuse_for_others() -> None:
+    """The note that a way was checked belongs to that very trajectory."""
+    predictor, way = ShortestDistance().fit(people()), people()[0]
+    predictor.predict_proba_at([way])
+    others = {
+        "prefix": way.first(3),
+        "not beside": replace(way, start="pot"),
+        "ends with": replace(way, goal="dish"),
+        "not one step": replace(way, states=way.states[[0, 2, 3, 4]], times=None),  # type: ignore[arg-type]
+        "neither floor": replace(way, layout=OvercookedLayout.from_ascii("XOXTX\nX   X\nXVX D\nX   X\nXXSPX")),
+    }
+    for message, other in others.items():
+        with pytest.raises(ValueError, match=message):
+            predictor.predict_proba_at([way, other])
+    twin = replace(way, participant="Ada")
+    assert twin != way
+    assert replace(twin, participant=way.participant) == way
