@@ -4,6 +4,7 @@ from .grid.baselines import GridLogistic, GridNeighbours, GridNGram
 from .grid.bayesian import BayesianGoalPredictor
 from .grid.maxent_irl import MaxEntIRL
 from .grid.shortest_distance import ShortestDistance
+from .inputs import TrajectoryError
 from .neural.models import RecurrentPredictor, TransformerPredictor
 from .reaching.baselines import ReachLogistic, ReachNeighbours
 from .reaching.bayesian import StraightLineBayesian
@@ -26,6 +27,7 @@ __all__ = [
     "StraightLineBayesian",
     "ThresholdDecision",
     "TimeSeriesGaussian",
+    "TrajectoryError",
     "TransformerPredictor",
     "UniformPredictor",
     "check_predictor",

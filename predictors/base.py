@@ -23,8 +23,16 @@ import numpy.typing as npt
 from sklearn.base import BaseEstimator
 from sklearn.exceptions import NotFittedError
 
-from legible_envs.rollouts.trajectory import Cut, Trajectory
-from legible_envs.support.validation import choice
+from legible_envs.rollouts.trajectory import (
+    LARGEST_COORDINATE,
+    LARGEST_TIME,
+    Cut,
+    Trajectory,
+    grid_kind,
+)
+from legible_envs.support.validation import choice, real, shown
+from predictors.inputs import TrajectoryError, check_fractions, check_trajectories, prefix_lengths
+from predictors.outputs import probability_fault
 
 __all__ = [
     "FRACTIONS",
@@ -33,8 +41,11 @@ __all__ = [
     "GoalPredictor",
     "GoalStream",
     "TieCredit",
+    "TrajectoryError",
+    "check_fractions",
     "check_trajectories",
     "correctness",
+    "prefix_lengths",
 ]
 
 TieCredit = Literal["fractional", "strict"]
@@ -57,6 +68,18 @@ class GoalPredictor(BaseEstimator, ABC):
     classes_: npt.NDArray[np.str_]
     _looked_up: tuple[npt.NDArray[np.str_], dict[tuple[str, ...], npt.NDArray[np.intp]]]
 
+    @property
+    def learns(self) -> bool:
+        """Whether ``fit`` learns from how people moved, beyond the names of goals and where these are.
+
+        A predictor that does not can be evaluated where there is nothing to learn from, such as trajectories that all
+        go to one goal. By default one does that has a ``fit`` of its own.
+        """
+        return type(self).fit is not GoalPredictor.fit
+
+    def _check_parameters(self) -> None:
+        """Raise ``ValueError`` if a parameter is bad; ``fit`` and evaluations call this before anything else."""
+
     def fit(self, X: Sequence[Trajectory], y: object = None) -> Self:
         """Learn from complete trajectories.
 
@@ -65,13 +88,18 @@ class GoalPredictor(BaseEstimator, ABC):
             y: Ignored; goals are part of the trajectories.
 
         Raises:
-            ValueError: No trajectories.
+            ValueError: No trajectories, or bad parameters.
             TypeError: Samples that are not trajectories.
         """
+        self._check_parameters()
         trajectories = check_trajectories(X)
         if not trajectories:
             raise ValueError(f"{type(self).__name__}.fit needs at least one trajectory, got none")
-        self.classes_ = np.array(sorted({name for trajectory in trajectories for name in trajectory.candidates}))
+        names = sorted({name for trajectory in trajectories for name in trajectory.candidates})
+        unsafe = [name for name in names if name.endswith("\0")]
+        if unsafe:  # arrays of texts drop these, so that two goals would become one
+            raise ValueError(f"names of goals must not end in a NUL character, got {unsafe}")
+        self.classes_ = np.array(names)
         return self
 
     @abstractmethod
@@ -96,18 +124,25 @@ class GoalPredictor(BaseEstimator, ABC):
 
         Args:
             X: ``n`` complete trajectories.
-            fractions: ``F`` fractions.
+            fractions: ``F`` fractions, in any order.
             cut: What the fraction is a share of, a key of :data:`legible_envs.rollouts.CUTS`.
 
         Returns:
-            ``(n, F, K)``.
+            ``(n, F, K)``, fractions in the order given.
+
+        Raises:
+            TrajectoryError: A prefix, or a trajectory that does not suit this predictor, with its number.
+            ValueError: Fractions out of range, or an unknown cut.
         """
-        trajectories = check_trajectories(X)
+        trajectories, fractions = check_trajectories(X), check_fractions(fractions, cut)
         # Neighbouring fractions of short trajectories are the same prefix: predict once for each.
-        lengths = [[trajectory.prefix_length(fraction, cut) for fraction in fractions] for trajectory in trajectories]
+        lengths = prefix_lengths(trajectories, fractions, cut)
         keys = sorted({(i, length) for i, row in enumerate(lengths) for length in row})
         row_of = {key: row for row, key in enumerate(keys)}
-        probabilities = self.predict_proba([trajectories[i].first(length) for i, length in keys])
+        try:
+            probabilities = self.predict_proba([trajectories[i].first(length) for i, length in keys])
+        except TrajectoryError as error:  # numbered among the prefixes
+            raise TrajectoryError(keys[error.number][0], error.participant, error.reason) from error
         rows = np.array([[row_of[i, length] for length in row] for i, row in enumerate(lengths)], dtype=np.intp)
         return probabilities[rows.reshape(len(trajectories), len(fractions))]
 
@@ -137,8 +172,13 @@ class GoalPredictor(BaseEstimator, ABC):
             fractions: Fractions observed.
             cut: What the fraction is a share of, a key of :data:`legible_envs.rollouts.CUTS`.
             ties: ``"fractional"``: a true goal among ``k`` tied ones counts 1/k. ``"strict"``: it counts 0.
+
+        Raises:
+            ValueError: No trajectories, prefixes among complete ones, unknown goals, fractions out of range or given
+                twice, or probabilities that are none.
         """
-        trajectories = check_trajectories(X)
+        trajectories, fractions = check_trajectories(X), check_fractions(fractions, cut, distinct=True)
+        choice("ties", ties, get_args(TieCredit))
         if not trajectories:
             raise ValueError("no trajectories to score")
         complete = sum(trajectory.complete for trajectory in trajectories)
@@ -146,10 +186,14 @@ class GoalPredictor(BaseEstimator, ABC):
             raise ValueError(
                 f"give complete trajectories or prefixes, not both ({complete} and {len(trajectories) - complete})"
             )
+        axes: tuple[int, ...] = (len(fractions),) if complete else ()
         if complete:
             probabilities = self.predict_proba_at(trajectories, fractions, cut)
         else:
             probabilities = self.predict_proba(trajectories)
+        fault = probability_fault(probabilities, trajectories, self.classes_, axes)
+        if fault:
+            raise ValueError(f"{type(self).__name__}: {fault}")
         return float(correctness(probabilities, self.goal_columns(trajectories), ties).mean())
 
     def stream(self, context: Trajectory) -> GoalStream:
@@ -173,7 +217,7 @@ class GoalPredictor(BaseEstimator, ABC):
         columns = []
         for number, trajectory in enumerate(trajectories):
             if trajectory.goal is None:
-                raise ValueError(f"trajectory {number} has no known goal to compare with")
+                raise TrajectoryError(number, trajectory.participant, "it has no known goal to compare with")
             columns.append(self.candidate_columns(trajectory)[trajectory.candidates.index(trajectory.goal)])
         return np.array(columns, dtype=np.intp)
 
@@ -218,23 +262,11 @@ class CandidatePredictor(GoalPredictor):
         columns = [self.candidate_columns(trajectory) for trajectory in trajectories]
         probabilities = np.zeros((len(trajectories), len(self.classes_)))
         for row, trajectory in enumerate(trajectories):
-            probabilities[row, columns[row]] = self.candidate_probabilities(trajectory)
+            try:
+                probabilities[row, columns[row]] = self.candidate_probabilities(trajectory)
+            except ValueError as error:
+                raise TrajectoryError.of(row, trajectory, error) from error
         return probabilities
-
-
-def check_trajectories(X: Sequence[Trajectory]) -> list[Trajectory]:
-    """The samples as a list.
-
-    Raises:
-        TypeError: A single trajectory, or samples that are not trajectories.
-    """
-    if isinstance(X, Trajectory):
-        raise TypeError("expected a list of trajectories, got a single one; put it in a list")
-    trajectories = list(X)
-    for number, trajectory in enumerate(trajectories):
-        if not isinstance(trajectory, Trajectory):
-            raise TypeError(f"expected trajectories, got {type(trajectory).__name__} at index {number}")
-    return trajectories
 
 
 def correctness(
@@ -262,13 +294,20 @@ def correctness(
 class GoalStream:
     """A predictor's belief about the goal of one person, updated while they move.
 
-    Made by :meth:`GoalPredictor.stream`.
+    Made by :meth:`GoalPredictor.stream`. A stream is about cells (integers) or about positions (floats): the first
+    point decides, unless the predictor takes one of the two only. Standing still on a cell is no new state.
+
+    Args:
+        predictor: A fitted predictor.
+        context: What is known beforehand.
+        cells: Whether points are cells; None leaves it to the first one.
     """
 
-    def __init__(self, predictor: GoalPredictor, context: Trajectory) -> None:
+    def __init__(self, predictor: GoalPredictor, context: Trajectory, *, cells: bool | None = None) -> None:
         self._predictor = predictor
         self._context = context.first(0)
         self._columns = predictor.candidate_columns(context)
+        self._cells = cells
         self._points: list[tuple[Any, ...]] = []
         self._times: list[float] = []
 
@@ -285,7 +324,10 @@ class GoalStream:
     @property
     def belief(self) -> dict[str, float]:
         """``{goal: probability}`` now; the prior before the first point."""
-        row = self._predictor.predict_proba([self._observed()])[0]
+        try:
+            row = self._predictor.predict_proba([self._observed()])[0]
+        except TrajectoryError as error:  # there is but one
+            raise ValueError(error.reason) from error
         return dict(zip(self._context.candidates, row[self._columns].tolist(), strict=True))
 
     def update(self, point: npt.ArrayLike, time: float | None = None) -> dict[str, float]:
@@ -296,27 +338,60 @@ class GoalStream:
             time: When, in seconds; one second after the state before if None.
 
         Raises:
-            ValueError: A point that is not finite or has another dimension than those before, or a time that runs
-                backwards.
+            ValueError: A point that is not finite, has another dimension than those before or does not suit the
+                predictor, or a time that runs backwards. The stream stays as it was.
         """
+        count, cells = len(self._points), self._cells
         self.add(point, time)
-        return self.belief
+        try:
+            return self.belief
+        except ValueError:
+            self._cells = cells
+            del self._points[count:], self._times[count:]
+            raise
 
     def add(self, point: npt.ArrayLike, time: float | None = None) -> None:
         """Add a state without asking for the belief; see :meth:`update`."""
-        array = np.asarray(point)
-        if array.ndim != 1 or not np.issubdtype(array.dtype, np.number) or not np.isfinite(array).all():
-            raise ValueError(f"expected one finite point of shape (d,), got {point!r}")
-        if self._points and len(self._points[-1]) != len(array):
-            raise ValueError(f"expected a point of dimension {len(self._points[-1])} as before, got {len(array)}")
-        when = (self._times[-1] + 1.0 if self._times else 0.0) if time is None else float(time)
+        state, is_cell = self._checked(point)
+        when = (self._times[-1] + 1.0 if self._times else 0.0) if time is None else real("time", time)
         if self._times and not when >= self._times[-1]:
             raise ValueError(f"time runs backwards: {when} after {self._times[-1]}")
-        value = tuple(array.tolist())
-        if np.issubdtype(array.dtype, np.integer) and self._points and self._points[-1] == value:
+        if abs(when) > LARGEST_TIME:
+            raise ValueError(f"times must be seconds up to {LARGEST_TIME:g}, got {when:g}")
+        self._cells = is_cell
+        if is_cell and self._points and self._points[-1] == state:
             return
-        self._points.append(value)
+        self._points.append(state)
         self._times.append(when)
+
+    def _checked(self, point: npt.ArrayLike) -> tuple[tuple[Any, ...], bool]:
+        """The point as plain numbers, and whether it is a cell."""
+        try:
+            array = np.asarray(point)
+        except ValueError:  # ragged
+            array = np.zeros((0, 0))
+        if isinstance(point, np.ma.MaskedArray) and np.ma.is_masked(point):
+            array = np.zeros((0, 0))
+        is_cell = grid_kind(array.dtype)
+        if is_cell is False:
+            with np.errstate(over="ignore"):  # of numbers beyond double precision, refused as infinite
+                array = array.astype(np.float64)
+        if array.ndim != 1 or not len(array) or is_cell is None or not np.isfinite(array).all():
+            raise ValueError(f"expected one finite point of shape (d,), got {shown(point)}")
+        if self._points and len(self._points[-1]) != len(array):
+            raise ValueError(f"expected a point of dimension {len(self._points[-1])} as before, got {len(array)}")
+        if ((array > LARGEST_COORDINATE) | (array < -LARGEST_COORDINATE)).any():
+            raise ValueError(
+                f"a point must be a cell, or metres or pixels, up to {LARGEST_COORDINATE:g}, got {shown(point)}"
+            )
+        if self._cells and not is_cell:
+            raise ValueError(
+                f"expected a point that is a cell (integers), got {shown(point)}; where points are positions, give "
+                "floats from the first one on"
+            )
+        if self._cells is False and is_cell:
+            array, is_cell = array.astype(np.float64), False
+        return tuple(array.tolist()), is_cell
 
     def _observed(self) -> Trajectory:
         """The prefix observed so far, with the context's labels but without its goal."""

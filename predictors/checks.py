@@ -13,6 +13,7 @@ from sklearn.base import clone
 from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.rollouts.trajectory import Trajectory
 from predictors.base import GoalPredictor
+from predictors.outputs import probability_fault
 
 __all__ = ["example_trajectories", "find_problems"]
 
@@ -23,6 +24,7 @@ X   D
 X   X
 XXSPX
 """
+_START = {(3, 2): "serving", (3, 3): "pot"}
 
 
 def example_trajectories() -> list[Trajectory]:
@@ -41,7 +43,12 @@ def example_trajectories() -> list[Trajectory]:
     ]
     return [
         Trajectory(
-            np.array(cells), start="serving", goal=goal, candidates=candidates, participant=f"p{i % 4}", layout=layout
+            np.array(cells),
+            start=_START[cells[0]],
+            goal=goal,
+            candidates=candidates,
+            participant=f"p{i % 4}",
+            layout=layout,
         )
         for i, (cells, goal, candidates) in enumerate(trajectories)
     ]
@@ -97,21 +104,7 @@ def _check_fit(predictor: GoalPredictor, trajectories: Sequence[Trajectory], fit
 
 
 def _check_probabilities(predictor: GoalPredictor, trajectories: Sequence[Trajectory]) -> str | None:
-    rows = predictor.predict_proba(trajectories)
-    expected = (len(trajectories), len(predictor.classes_))
-    if not isinstance(rows, np.ndarray) or rows.shape != expected:
-        return f"expected an array of shape {expected}, got {getattr(rows, 'shape', type(rows).__name__)}"
-    if not np.isfinite(rows).all() or (rows < 0).any():
-        return "probabilities must be finite and >= 0"
-    if not np.allclose(rows.sum(axis=1), 1.0):
-        return f"rows must sum to 1, got {rows.sum(axis=1).round(6).tolist()}"
-    for row, trajectory in zip(rows, trajectories, strict=True):
-        others = [
-            name for name, p in zip(predictor.classes_, row, strict=True) if p > 0 and name not in trajectory.candidates
-        ]
-        if others:
-            return f"{others} got probability without being candidates {trajectory.candidates}"
-    return None
+    return probability_fault(predictor.predict_proba(trajectories), trajectories, predictor.classes_)
 
 
 def _check_independence(predictor: GoalPredictor, trajectories: Sequence[Trajectory]) -> str | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -51,7 +52,7 @@ class PredictionResults:
         evaluation: By cross-validation.
         curve: The learning curve, or None where it was not wanted or there are too few trajectories for one.
         comparisons: By what was compared: ``"predictor"``, or ``"condition"`` and whose values.
-        notes: Analyses that were left out, and why.
+        notes: Predictors that could not be evaluated and analyses that were left out, and why.
     """
 
     evaluation: Evaluation
@@ -87,9 +88,10 @@ def evaluate_trajectories(
 
     Raises:
         PredictorError: A predictor that cannot be found or made.
-        ValueError: Trajectories that cannot be split so.
+        ValueError: None of the predictors can be evaluated on these trajectories.
     """
     from predictors.evaluation.cross_validation import evaluate, learning_curve
+    from predictors.evaluation.omissions import omission_notes
 
     names = list(dict.fromkeys(predictors))
     found = evaluate(
@@ -102,18 +104,20 @@ def evaluate_trajectories(
         rare="keep" if keep_rare else "error",
         seed=seed,
     )
-    notes: list[str] = []
+    notes = omission_notes(found.omitted)
     grown = None
     if curve:
         try:
             grown = learning_curve(names, trajectories, cut=cut, groups=groups, repeats=3, seed=seed)
+            left_out = [note for note in omission_notes(grown.omitted) if note not in notes]
+            notes += [f"learning curve: {note}" for note in left_out]
         except ValueError as error:
             notes.append(f"no learning curve: {error}")
     comparisons: dict[str, tuple[Comparison, Comparison]] = {}
-    if len(names) > 1:
+    if len(found.predictors) > 1:
         _compare(comparisons, notes, "predictor", found, factor="predictor")
     if len({trajectory.condition for trajectory in trajectories}) > 1:
-        for name in names:
+        for name in found.predictors:
             _compare(comparisons, notes, f"condition ({name})", found, factor="condition", predictor=name)
     return PredictionResults(found, grown, comparisons, notes)
 
@@ -165,7 +169,7 @@ def _summary_rows(found: Evaluation) -> list[dict[str, Any]]:
 
 def _accuracy_rows(found: Evaluation) -> list[dict[str, Any]]:
     wide = found.accuracy().pivot_table(index="predictor", columns="fraction", values="accuracy", sort=False)
-    wide = wide.reindex(columns=sorted(wide.columns))
+    wide = wide.reindex([*wide.index, *found.omitted["predictor"]], columns=sorted(wide.columns))
     return [
         {"predictor": name, **{f"{100 * fraction:.3g}%": float(row[fraction]) for fraction in wide.columns}}
         for name, row in wide.iterrows()
@@ -229,6 +233,8 @@ def _tables(results: PredictionResults) -> dict[str, pd.DataFrame]:
         "metrics": found.metrics(),
         "confusion": found.confusion,
     }
+    if len(found.omitted):
+        tables["omitted"] = found.omitted
     if results.curve is not None:
         tables["learning_curve"] = results.curve.table
     for part in ("anova", "means", "pairs"):
@@ -266,7 +272,7 @@ def _about(results: PredictionResults) -> dict[str, Any]:
         "definition": found.definition,
         "walks": int(found.table["trajectory"].nunique()),
         "participants": int(found.table["participant"].nunique()),
-        "summary": _summary_rows(found),
+        "summary": _finite(_summary_rows(found)),
         "comparisons": [
             {"what": what, "verdict": _verdict(mean), "pairs": _finite(_pair_rows(mean))}
             for what, (_, mean) in results.comparisons.items()
@@ -276,9 +282,9 @@ def _about(results: PredictionResults) -> dict[str, Any]:
 
 
 def _finite(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Rows for JSON, which has no infinite effect sizes: None instead."""
+    """Rows for JSON, which has no infinite effect sizes and no missing numbers: None instead."""
     return [
-        {key: None if isinstance(value, float) and abs(value) == float("inf") else value for key, value in row.items()}
+        {key: None if isinstance(value, float) and not math.isfinite(value) else value for key, value in row.items()}
         for row in rows
     ]
 

@@ -53,6 +53,7 @@ class Comparison:
         alpha: Level of the bands and intervals.
         dropped: Units that were left out because a condition lacks them.
         definition: Of the values, if the evaluation gave one.
+        omitted: Sentences about predictors that are not compared because they could not be evaluated.
     """
 
     anova: pd.DataFrame = field(repr=False)
@@ -64,6 +65,7 @@ class Comparison:
     alpha: float
     dropped: int = 0
     definition: str = ""
+    omitted: tuple[str, ...] = ()
 
 
 def compare_conditions(
@@ -112,6 +114,7 @@ def compare_conditions(
     if isinstance(results, Mapping):
         factor = "condition" if factor == "layout" else factor
     table = _one_table(results)
+    omitted = _about_omitted(table, None if factor == "predictor" else predictor)
     table = _chosen(table, factor, predictor, value)
     if unit == "fold":
         warnings.warn(
@@ -123,14 +126,21 @@ def compare_conditions(
     table = _with_units(table, factor, unit)
     levels = list(dict.fromkeys(table[factor].tolist()))
     if len(levels) < 2:
-        raise ValueError(f"nothing to compare: the only {factor} is {levels[0]!r}" if levels else "no rows to compare")
+        only = f"nothing to compare: the only {factor} is {levels[0]!r}" if levels else "no rows to compare"
+        raise ValueError("; ".join((only, *omitted)))
     chosen, table, dropped = _designed(table, factor, unit, levels, design)
     tables = _tests(table, factor, levels, value, chosen, at, alpha)
     if correct_fractions == "holm":
         _correct(tables)
     anova, means, pairs = tables
     definition = str(table.attrs.get("evaluation", table.attrs.get("definition", "")))
-    return Comparison(anova, means, pairs, factor, unit, chosen, alpha, dropped, definition)
+    return Comparison(anova, means, pairs, factor, unit, chosen, alpha, dropped, definition, omitted)
+
+
+def _about_omitted(table: pd.DataFrame, predictor: str | None) -> tuple[str, ...]:
+    """Sentences about predictors without values; only about one if it is named."""
+    notes = [str(note) for note in table.attrs.get("omitted", ())]
+    return tuple(note for note in notes if predictor is None or note.startswith(f"{predictor} was not evaluated"))
 
 
 # -- what is compared -------------------------------------------------------------------------------------------------
@@ -159,6 +169,9 @@ def _one_table(results: Any) -> pd.DataFrame:
         ignore_index=True,
     )
     whole.attrs.update(next(iter(parts.values())).attrs)
+    whole.attrs["omitted"] = [
+        f"{note} (in {name!r})" for name, part in parts.items() for note in part.attrs.get("omitted", ())
+    ]
     return whole
 
 
@@ -180,7 +193,8 @@ def _chosen(table: pd.DataFrame, factor: str, predictor: str | None, value: str)
         if predictor is None and len(names) > 1:
             raise ValueError(f"say whose values to compare with predictor=; the table has {names}")
         if predictor is not None and predictor not in names:
-            raise ValueError(f"no values of predictor {predictor!r}; the table has {names}")
+            why = "".join(f"; {note}" for note in _about_omitted(table, predictor))
+            raise ValueError(f"no values of predictor {predictor!r}; the table has {names}{why}")
         if predictor is not None:
             table = table[table["predictor"] == predictor]
     if not np.isfinite(table[value].to_numpy(dtype=np.float64)).all():

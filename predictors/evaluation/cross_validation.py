@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final, Literal
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import CUTS, Cut, Trajectory
-from legible_envs.support.validation import choice, integer, is_integer, is_real
-from predictors.base import FRACTIONS, GoalPredictor, TieCredit, correctness
-from predictors.evaluation.comparison import Comparison, compare_conditions
-from predictors.evaluation.metrics import tied_shares
-from predictors.evaluation.results import Evaluation, LearningCurve
-from predictors.evaluation.splits import (
-    Groups,
-    Split,
-    check_candidate_sets,
-    check_learnable,
-    folds,
-    nested_training_sets,
+from legible_envs.support.validation import choice, integer
+from predictors.base import FRACTIONS, GoalPredictor, TieCredit, TrajectoryError, check_fractions, correctness
+from predictors.evaluation.answers import (
+    Specs,
+    check_input,
+    contract_error,
+    fitted_on,
+    named_predictors,
+    probabilities_of,
+    renumbered,
 )
+from predictors.evaluation.comparison import Comparison, compare_conditions
+from predictors.evaluation.learning_curves import learning_curve
+from predictors.evaluation.metrics import tied_shares
+from predictors.evaluation.omissions import Omission, no_predictor_left, omission_table
+from predictors.evaluation.results import Evaluation, LearningCurve
+from predictors.evaluation.splits import Groups, Rare, Split, check_evaluable, check_seed, folds
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -36,12 +41,7 @@ __all__ = [
     "learning_curve",
 ]
 
-Spec = str | GoalPredictor | Callable[..., GoalPredictor]
-Specs = Spec | Sequence[Spec] | Mapping[str, Spec]
 Part = Literal["condition", "layout"]
-
-_REDRAWS: Final = 1000
-"""How many splits are drawn to find those whose smallest training set mentions every goal."""
 
 
 def accuracy_at(
@@ -67,11 +67,16 @@ def accuracy_at(
         true goal) and ``correct`` (0 to 1). ``.attrs`` holds ``cut``, ``definition``, ``ties`` and ``candidate_set``.
 
     Raises:
-        ValueError: Prefixes, unknown goals, or mixed candidate sets, whose accuracies must not be averaged.
+        PredictorError: The predictor's answer is no probabilities of the candidates.
+        ValueError: Prefixes, unknown goals, mixed candidate sets, whose accuracies must not be averaged, or bad
+            fractions.
     """
-    trajectories = list(X)
-    candidate_set = check_candidate_sets(trajectories)
-    probabilities = predictor.predict_proba_at(trajectories, fractions, cut)
+    trajectories, fractions = list(X), check_fractions(fractions, cut, distinct=True)
+    choice("ties", ties, get_args(TieCredit))
+    if trajectories:
+        check_evaluable(trajectories)
+    candidate_set = trajectories[0].candidate_set if trajectories else None
+    probabilities = probabilities_of(type(predictor).__name__, predictor, trajectories, fractions, cut)
     table = _rows(trajectories, probabilities, predictor.goal_columns(trajectories), fractions, cut, ties)
     table.attrs.update(cut=cut, definition=CUTS[cut], ties=ties, candidate_set=candidate_set)
     return table
@@ -124,12 +129,16 @@ def evaluate(
     ties: TieCredit = "fractional",
     groups: Groups | None = None,
     by: Part | None = None,
-    rare: Literal["error", "keep"] = "error",
+    rare: Rare = "error",
     seed: int | np.random.Generator = 0,
 ) -> Evaluation:
     """Evaluate predictors by stratified cross-validation: every trajectory is predicted once per repeat, unseen.
 
-    All predictors see the same splits.
+    All predictors see the same splits. A predictor that cannot be evaluated on these trajectories is left out, with the
+    reason in ``omitted``, and the results of the others stand: one that learns, where all people chose one goal or
+    there is no way to split the trajectories; and one that refuses them, such as a predictor of reaches in a kitchen. A
+    predictor that learns nothing (:attr:`~predictors.base.GoalPredictor.learns`) needs no splits; where there are none,
+    it is told the goals, starts and layouts only, and its rows have fold 0.
 
     Args:
         predictors: One predictor or several: instances, registered names, ``"module:Class"`` or classes; a mapping
@@ -142,45 +151,44 @@ def evaluate(
         ties: How a true goal that shares the top counts; see :func:`predictors.base.correctness`.
         groups: ``"participant"``: no participant is on both sides of a split. None: trajectories are split singly.
         by: ``"condition"`` or ``"layout"``: fit and evaluate within each apart, as for comparing layouts.
-        rare: ``"error"`` refuses goals with fewer examples than folds; ``"keep"`` evaluates on them all the same.
+        rare: What keeps predictors from learning: with ``"error"`` goals with fewer examples than folds; ``"keep"``
+            evaluates on them all the same.
         seed: Of the splits.
 
     Returns:
         The result; its tables are tidy.
 
     Raises:
-        PredictorError: A predictor that cannot be found or made.
-        ValueError: Trajectories that cannot be split so, with the reason; unknown options.
+        PredictorError: A predictor that cannot be found or made, or whose answers are no probabilities.
+        TrajectoryError: A prefix, an unknown goal, or a trajectory that does not fit its kitchen.
+        ValueError: None of the predictors can be evaluated, with the reasons; bad parameters of one; no trajectories,
+            mixed candidate sets, unknown options.
         TypeError: Samples that are not trajectories.
     """
     import pandas as pd
-    from sklearn.base import clone
 
-    trajectories = list(X)
-    check_learnable(trajectories)
-    _check_options(fractions, cut, repeats)
-    named = _named(predictors)
-    parts = _parts(trajectories, by)
-    rng = np.random.default_rng(seed)
-    tables, confusions = [], []
-    for part, members in parts.items():
-        for repeat in range(repeats):
-            try:
-                splits = list(folds([trajectories[i] for i in members], cv, rng, groups=groups, rare=rare))
-            except ValueError as error:
-                raise ValueError(f"{by} {part!r}: {error}" if by else str(error)) from error
-            for fold, (train, test) in enumerate(splits):
-                learned, held_out = ([trajectories[members[i]] for i in half] for half in (train, test))
-                for name, predictor in named.items():
-                    fitted = clone(predictor).fit(learned)
-                    rows, confusion = _predict_rows(fitted, held_out, fractions, cut, ties)
-                    rows["trajectory"] = members[test][rows["trajectory"].to_numpy()]
-                    labels = {"predictor": name, "repeat": repeat, "fold": fold}
-                    tables.append(_labelled(rows, labels))
-                    confusions.append(_labelled(confusion, labels | ({by: part} if by else {})))
+    trajectories, fractions = list(X), check_fractions(fractions, cut, distinct=True)
+    integer("cv", cv, 2, unit="folds")
+    integer("repeats", repeats, 1)
+    choice("rare", rare, get_args(Rare))
+    check_input(trajectories, fractions, cut, ties, groups)
+    named = named_predictors(predictors)
+    rng = check_seed(seed)
+    plan = _Plan(cv, repeats, fractions, cut, ties, groups, rare)
+    results: list[_FoldResult] = []
+    omissions: list[Omission] = []
+    unsplit: dict[str, str] = {}
+    for part, members in _parts(trajectories, by).items():
+        found, reasons, no_splits = _cross_validate(named, trajectories, members, plan, rng)
+        if no_splits is not None and found:
+            unsplit[part] = no_splits
+        results += [result.of_part(by, part) for result in found]
+        omissions += [Omission(name, part, reason) for name, reason in reasons.items()]
+    if not results:
+        raise no_predictor_left(omissions, by)
     return Evaluation(
-        table=pd.concat(tables, ignore_index=True),
-        confusion=pd.concat(confusions, ignore_index=True),
+        table=pd.concat([result.rows for result in results], ignore_index=True),
+        confusion=pd.concat([result.confusion for result in results], ignore_index=True),
         cut=cut,
         ties=ties,
         candidate_set=trajectories[0].candidate_set,
@@ -188,35 +196,82 @@ def evaluate(
         repeats=repeats,
         groups=groups,
         by=by,
+        omitted=omission_table(omissions, by),
+        unsplit=unsplit,
     )
 
 
-def _check_options(fractions: Sequence[float], cut: Cut, repeats: int) -> None:
-    if cut not in CUTS:
-        raise ValueError(f"unknown cut {cut!r}; expected one of {list(CUTS)}")
-    if not len(fractions) or len(set(fractions)) != len(fractions):
-        raise ValueError(f"`fractions` must be at least one, each once, got {fractions!r}")
-    integer("repeats", repeats, 1)
+@dataclass(frozen=True)
+class _Plan:
+    """How predictors are evaluated; see :func:`evaluate`."""
+
+    cv: int
+    repeats: int
+    fractions: tuple[float, ...]
+    cut: Cut
+    ties: TieCredit
+    groups: Groups | None
+    rare: Rare
 
 
-def _named(specs: Specs) -> dict[str, GoalPredictor]:
-    """Predictors by the names that tables use."""
-    from predictors.registry import make_predictor
+class _FoldResult(NamedTuple):
+    """What one predictor said of the held-out part of one fold, as rows of the tables of an evaluation."""
 
-    if isinstance(specs, Mapping):
-        named = {str(name): make_predictor(spec) for name, spec in specs.items()}
-    else:
-        listed: Sequence[Spec] = [specs] if isinstance(specs, str | GoalPredictor) or callable(specs) else list(specs)
-        named = {}
-        for spec in listed:
-            made = make_predictor(spec)
-            name = spec if isinstance(spec, str) else type(made).__name__
-            if name in named:
-                raise ValueError(f"several predictors are called {name!r}; give a mapping of names to predictors")
-            named[name] = made
-    if not named:
-        raise ValueError("no predictors to evaluate")
-    return named
+    rows: pd.DataFrame
+    confusion: pd.DataFrame
+
+    def of_part(self, by: Part | None, part: str) -> _FoldResult:
+        """The same, with a column that says which part of the trajectories this is."""
+        if by is not None:
+            self.confusion.insert(3, by, part)
+        return self
+
+
+def _cross_validate(
+    named: Mapping[str, GoalPredictor],
+    trajectories: Sequence[Trajectory],
+    members: npt.NDArray[np.intp],
+    plan: _Plan,
+    rng: np.random.Generator,
+) -> tuple[list[_FoldResult], dict[str, str], str | None]:
+    """Results on some of the trajectories, why predictors have none, and why there are no folds."""
+    results: dict[str, list[tuple[int, _FoldResult]]] = {name: [] for name in named}
+    reasons: dict[str, str] = {}
+    unsplit: str | None = None
+    place = 0
+    for repeat in range(plan.repeats):
+        splits, no_splits = _splits_or_reason([trajectories[i] for i in members], plan, rng)
+        unsplit = unsplit or no_splits
+        for fold, (train, test) in enumerate(splits):
+            for name, predictor in named.items():
+                if no_splits is not None and predictor.learns:
+                    reasons.setdefault(name, no_splits)
+                if name in reasons:
+                    continue
+                try:
+                    fitted = fitted_on(predictor, trajectories, members[train], contexts=no_splits is not None)
+                    rows, confusion = _predict_rows(name, fitted, trajectories, members[test], plan)
+                except contract_error():
+                    raise
+                except ValueError as error:
+                    reasons[name] = str(error)
+                    continue
+                labels = {"predictor": name, "repeat": repeat, "fold": fold}
+                results[name].append((place, _FoldResult(_labelled(rows, labels), _labelled(confusion, labels))))
+                place += 1
+    kept = [each for name, found in results.items() if name not in reasons for each in found]
+    return [result for _, result in sorted(kept, key=lambda each: each[0])], reasons, unsplit
+
+
+def _splits_or_reason(
+    trajectories: Sequence[Trajectory], plan: _Plan, rng: np.random.Generator
+) -> tuple[list[Split], str | None]:
+    """The folds; or a single one of all trajectories, and why they cannot be split."""
+    try:
+        return list(folds(trajectories, plan.cv, rng, groups=plan.groups, rare=plan.rare)), None
+    except ValueError as error:
+        every = np.arange(len(trajectories))
+        return [(every, every)], str(error)
 
 
 def _parts(trajectories: Sequence[Trajectory], by: Part | None) -> dict[str, npt.NDArray[np.intp]]:
@@ -232,18 +287,27 @@ def _parts(trajectories: Sequence[Trajectory], by: Part | None) -> dict[str, npt
 
 
 def _predict_rows(
-    predictor: GoalPredictor, trajectories: Sequence[Trajectory], fractions: Sequence[float], cut: Cut, ties: TieCredit
+    name: str,
+    predictor: GoalPredictor,
+    trajectories: Sequence[Trajectory],
+    numbers: npt.NDArray[np.intp],
+    plan: _Plan,
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Rows as of :func:`accuracy_at` with ``confidence``, and confusions as ``fraction, goal, predicted, count``."""
     import pandas as pd
 
-    probabilities = predictor.predict_proba_at(trajectories, fractions, cut)
-    goals = predictor.goal_columns(trajectories)
-    rows = _rows(trajectories, probabilities, goals, fractions, cut, ties)
+    held_out, fractions = [trajectories[i] for i in numbers], plan.fractions
+    try:
+        probabilities = probabilities_of(name, predictor, held_out, fractions, plan.cut)
+        goals = predictor.goal_columns(held_out)
+    except TrajectoryError as error:
+        raise renumbered(error, numbers) from error
+    rows = _rows(held_out, probabilities, goals, fractions, plan.cut, plan.ties)
+    rows["trajectory"] = numbers[rows["trajectory"].to_numpy()]
     rows["confidence"] = probabilities.max(axis=-1).ravel()
     names = np.asarray(predictor.classes_)
     counts = np.zeros((len(fractions), len(names), len(names)))
-    for goal, shares in zip(goals, tied_shares(probabilities, ties), strict=True):
+    for goal, shares in zip(goals, tied_shares(probabilities, plan.ties), strict=True):
         counts[:, goal] += shares
     where = np.nonzero(counts)
     confusion = pd.DataFrame(
@@ -261,120 +325,3 @@ def _labelled(table: pd.DataFrame, labels: Mapping[str, Any]) -> pd.DataFrame:
     for place, (name, value) in enumerate(labels.items()):
         table.insert(place, name, value)
     return table
-
-
-# -- learning curves --------------------------------------------------------------------------------------------------
-
-
-def learning_curve(
-    predictors: Specs,
-    X: Sequence[Trajectory],
-    *,
-    sizes: Sequence[int | float] = (0.1, 0.2, 0.4, 0.7, 1.0),
-    test_share: float = 0.25,
-    repeats: int = 5,
-    fractions: Sequence[float] = FRACTIONS,
-    cut: Cut = "steps",
-    ties: TieCredit = "fractional",
-    groups: Groups | None = None,
-    rare: Literal["error", "redraw"] = "error",
-    seed: int | np.random.Generator = 0,
-) -> LearningCurve:
-    """How accuracy grows with the number of trajectories learned from.
-
-    In each repeat a fixed share is held out to evaluate on; training sets are nested, and without groups hold goals in
-    proportion.
-
-    Args:
-        predictors: As for :func:`evaluate`.
-        X: Complete trajectories with known goals.
-        sizes: Training sizes: whole numbers of trajectories, or shares (floats <= 1) of those not held out
-            (with groups, of the fewest in any repeat).
-        test_share: Share held out.
-        repeats: How often, with other splits.
-        fractions: Fractions observed.
-        cut: What the fraction is a share of, a key of :data:`legible_envs.rollouts.CUTS`.
-        ties: As for :func:`evaluate`.
-        groups: As for :func:`evaluate`.
-        rare: ``"error"`` refuses splits whose smallest training set never mentions a goal that is held out;
-            ``"redraw"`` draws splits until it mentions every goal (without groups only).
-        seed: Of the splits.
-
-    Raises:
-        ValueError: Sizes that are no sizes or larger than what is left to learn from; goals that the smallest training
-            set does not mention, nor hardly any other split would; and as for :func:`evaluate`.
-    """
-    import pandas as pd
-    from sklearn.base import clone
-
-    trajectories = list(X)
-    check_learnable(trajectories)
-    _check_options(fractions, cut, repeats)
-    named = _named(predictors)
-    rng = np.random.default_rng(seed)
-    rows = []
-    splits = _splits(trajectories, sizes, test_share, repeats, rng, groups, rare)
-    # Groups are of different sizes: the smallest pool decides, so that every repeat has the same training sizes.
-    counts = _sizes(sizes, min(len(pool) for pool, _ in splits))
-    for repeat, (pool, test) in enumerate(splits):
-        held_out = [trajectories[i] for i in test]
-        for size in counts:
-            learned = [trajectories[i] for i in pool[:size]]
-            _check_known(learned, held_out)
-            for name, predictor in named.items():
-                fitted = clone(predictor).fit(learned)
-                probabilities = fitted.predict_proba_at(held_out, fractions, cut)
-                correct = correctness(probabilities, fitted.goal_columns(held_out), ties).mean(axis=0)
-                for fraction, accuracy in zip(fractions, correct, strict=True):
-                    rows.append((name, repeat, size, len(held_out), float(fraction), float(accuracy)))
-    columns = ["predictor", "repeat", "size", "judged", "fraction", "accuracy"]
-    return LearningCurve(pd.DataFrame(rows, columns=columns), cut, ties, trajectories[0].candidate_set, test_share)
-
-
-def _splits(
-    trajectories: Sequence[Trajectory],
-    sizes: Sequence[int | float],
-    test_share: float,
-    repeats: int,
-    rng: np.random.Generator,
-    groups: Groups | None,
-    rare: str,
-) -> list[Split]:
-    """Pools to learn from and test sets, one pair per repeat."""
-    if rare == "error":
-        return [nested_training_sets(trajectories, test_share, rng, groups) for _ in range(repeats)]
-    choice("rare", rare, ("error", "redraw"))
-    if groups is not None:
-        raise ValueError("rare='redraw' draws splits of single trajectories; use groups=None")
-    names = {name for trajectory in trajectories for name in trajectory.candidates}
-    found: list[Split] = []
-    for seed in rng.integers(2**31, size=_REDRAWS).tolist():
-        pool, test = nested_training_sets(trajectories, test_share, np.random.default_rng(seed))
-        least = _sizes(sizes, len(pool))[0]
-        if {name for i in pool[:least] for name in trajectories[i].candidates} == names:
-            found.append((pool, test))
-        if len(found) == repeats:
-            return found
-    raise ValueError(
-        f"in only {len(found)} of {_REDRAWS} splits the {least} trajectories learned from mention every goal; "
-        f"{repeats} are needed: begin with a larger size"
-    )
-
-
-def _sizes(sizes: Sequence[int | float], available: int) -> list[int]:
-    found = []
-    for size in sizes:
-        count = size if is_integer(size) else round(size * available) if is_real(size) and 0 < size <= 1 else 0
-        if not 1 <= count <= available:
-            raise ValueError(f"size {size!r} is neither 1..{available} trajectories nor a share in (0, 1] of them")
-        found.append(int(count))
-    if not found:
-        raise ValueError("`sizes` must name at least one training size")
-    return sorted(set(found))
-
-
-def _check_known(learned: Sequence[Trajectory], held_out: Sequence[Trajectory]) -> None:
-    known = {name for trajectory in learned for name in trajectory.candidates}
-    unknown = sorted({name for trajectory in held_out for name in trajectory.candidates} - known)
-    if unknown:
-        raise ValueError(f"{len(learned)} trajectories to learn from never mention goals {unknown}; use larger sizes")

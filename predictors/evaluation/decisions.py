@@ -18,8 +18,10 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import Trajectory
-from legible_envs.support.validation import integer, real
-from predictors.base import TIE_TOLERANCE, GoalPredictor, check_trajectories
+from legible_envs.support.validation import entries, integer, real, shown
+from predictors.base import TIE_TOLERANCE, GoalPredictor, TrajectoryError, check_trajectories
+from predictors.grid.base import check_recorded
+from predictors.outputs import probability_fault
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -100,8 +102,11 @@ class ThresholdDecision:
         """The rows of :meth:`decide` for several thresholds; :func:`summarise_decisions` makes a curve of them."""
         import pandas as pd
 
-        levels = [real("each of `thresholds`", threshold, 0, 1, closed="right") for threshold in thresholds]
+        levels = [real("each of `thresholds`", each, 0, 1, closed="right") for each in entries(thresholds)]
+        if not levels or len(set(levels)) < len(levels):
+            raise ValueError(f"`thresholds` must be at least one number, each once, got {shown(thresholds)}")
         trajectories = check_trajectories(X)
+        check_recorded(trajectories)
         beliefs = self._beliefs(trajectories)
         rows = [
             _row(number, trajectory, level, self._first_decision(trajectory, belief, level))
@@ -118,7 +123,9 @@ class ThresholdDecision:
             for trajectory, count in zip(trajectories, steps, strict=True)
             for t in range(1, count + 1)
         ]
-        rows = self.predictor.predict_proba(prefixes) if prefixes else np.zeros((0, 0))
+        rows = self._probabilities(
+            prefixes, np.repeat(np.arange(len(steps)), np.maximum(np.array(steps, dtype=np.intp), 0))
+        )
         ends = np.cumsum([max(count, 0) for count in steps], dtype=np.intp)
         return [
             rows[end - max(count, 0) : end][:, self.predictor.candidate_columns(trajectory)]
@@ -126,6 +133,19 @@ class ThresholdDecision:
             else np.zeros((0, 0))
             for trajectory, count, end in zip(trajectories, steps, ends, strict=True)
         ]
+
+    def _probabilities(self, prefixes: list[Trajectory], numbers: npt.NDArray[np.intp]) -> npt.NDArray[np.float64]:
+        """Rows of the predictor for prefixes of the trajectories of these numbers."""
+        if not prefixes:
+            return np.zeros((0, 0))
+        try:
+            rows = self.predictor.predict_proba(prefixes)
+        except TrajectoryError as error:  # numbered among the prefixes
+            raise TrajectoryError(int(numbers[error.number]), error.participant, error.reason) from error
+        fault = probability_fault(rows, prefixes, self.predictor.classes_)
+        if fault:
+            raise ValueError(f"{type(self.predictor).__name__}: {fault}")
+        return rows
 
     def _first_decision(
         self, trajectory: Trajectory, beliefs: npt.NDArray[np.float64], threshold: float

@@ -7,7 +7,7 @@ a figure has the width of a paper's column or page, and no heading and note, whi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -60,7 +60,7 @@ def accuracy_figure(
         chart = Chart(
             title,
             subtitle or f"mean over trajectories; bands: {about.get('level', 0.95):.0%} confidence{units}",
-            str(about.get("evaluation", about.get("definition", ""))),
+            _note(about, str(about.get("evaluation", about.get("definition", "")))),
             description=f"Accuracy against percentage observed for {', '.join(series)}.",
             size=size,
             height=max(2.9, 0.24 * len(series) + 0.6),
@@ -107,7 +107,7 @@ def learning_curve_figure(
         chart = Chart(
             title,
             subtitle or "mean over fractions observed; bands: one standard deviation between splits",
-            str(table.attrs.get("evaluation", "")),
+            _note(table.attrs, str(table.attrs.get("evaluation", ""))),
             description=f"Accuracy against training size for {', '.join(series)}.",
             size=size,
             height=max(2.9, 0.24 * len(series) + 0.6),
@@ -183,6 +183,11 @@ def confusion_figure(
         axes.set_xlabel("predicted goal")
         axes.set_ylabel("true goal", labelpad=72 * names_and_counts + 0.2 * own.text + 6)
         return chart
+
+
+def _note(about: Mapping[Any, Any], definition: str) -> str:
+    """What stands below a figure: what is drawn, and which predictors are missing from it."""
+    return "; ".join([definition, *map(str, about.get("omitted", ()))]).removeprefix("; ")
 
 
 def _draw_series(chart: Chart, axes: Axes, series: dict[str, pd.DataFrame], at: str) -> None:

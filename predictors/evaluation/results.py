@@ -10,9 +10,15 @@ import numpy as np
 from legible_envs.rollouts.trajectory import CUTS
 from legible_envs.support.validation import choice, real
 from predictors.evaluation.metrics import calibration_error, clustered_interval, log_loss, weighted_scores
+from predictors.evaluation.omissions import (
+    NO_NUMBER,
+    markdown_table,
+    omission_notes,
+    omission_table,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     import pandas as pd
 
@@ -36,6 +42,10 @@ class Evaluation:
         repeats: Repeats.
         groups: What was kept on one side of every split.
         by: Within the parts of what the predictors were fitted and evaluated: ``"condition"``, ``"layout"`` or None.
+        omitted: ``predictor`` (and what ``by`` names), ``reason``: predictors that could not be evaluated on these
+            trajectories, and why. They have no rows in ``table``; :meth:`summary` and :meth:`to_markdown` list them.
+        unsplit: Why trajectories could not be split into folds, so that only predictors that learn nothing were
+            evaluated: ``{what by names: reason}``, the key ``""`` where ``by`` is None.
     """
 
     table: pd.DataFrame = field(repr=False)
@@ -47,6 +57,8 @@ class Evaluation:
     repeats: int
     groups: str | None = None
     by: str | None = None
+    omitted: pd.DataFrame = field(default_factory=omission_table, repr=False)
+    unsplit: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for table in (self.table, self.confusion):
@@ -56,14 +68,21 @@ class Evaluation:
     def definition(self) -> str:
         """What the figures mean, in a sentence; to be printed beside them."""
         grouped = ", no participant on both sides" if self.groups else ""
+        whole = {""} if self.by is None else set(self.table[self.by])
+        folded = f"{self.cv}-fold stratified cross-validation x {self.repeats}{grouped}; "
+        if whole <= self.unsplit.keys():
+            folded = ""
+        for part, reason in self.unsplit.items():
+            where = f" in {self.by} {part!r}" if self.by else ""
+            folded += f"predictors that learn nothing evaluated without folds{where} ({reason}); "
         return (
-            f"{self.cv}-fold stratified cross-validation x {self.repeats}{grouped}; fraction f observed means "
-            f"{CUTS[self.cut]} (cut {self.cut!r}); ties {self.ties}; candidate set {self.candidate_set!r}"
+            f"{folded}fraction f observed means {CUTS[self.cut]} (cut {self.cut!r}); ties {self.ties}; "
+            f"candidate set {self.candidate_set!r}"
         )
 
     @property
     def predictors(self) -> list[str]:
-        """Names of the predictors, in the order given."""
+        """Names of the predictors that were evaluated, in the order given."""
         return list(dict.fromkeys(self.table["predictor"]))
 
     @property
@@ -137,12 +156,26 @@ class Evaluation:
         return self._describe(means)
 
     def summary(self) -> pd.DataFrame:
-        """A row per predictor (and what ``by`` names): the means of :meth:`metrics` over fractions."""
+        """A row per predictor (and what ``by`` names): the means of :meth:`metrics` over fractions.
+
+        Predictors that could not be evaluated come last, with NaN and the ``reason``, which is ``""`` for the others.
+        """
+        import pandas as pd
+
         means = self.metrics().drop(columns="fraction").groupby(self.keys, sort=False, as_index=False).mean()
         counts = self.table.groupby(self.keys, sort=False, as_index=False).agg(
             trajectories=("trajectory", "nunique"), participants=("participant", "nunique")
         )
-        return self._describe(means.merge(counts, on=self.keys))
+        found = means.merge(counts, on=self.keys).assign(reason="")
+        if len(self.omitted):
+            found = pd.concat([found, self.omitted.assign(trajectories=0, participants=0)], ignore_index=True)
+        return self._describe(found)
+
+    def to_markdown(self) -> str:
+        """:meth:`summary` as a Markdown table: a dash where there is no number, and the reasons below."""
+        found = self.summary().drop(columns="reason")
+        notes = omission_notes(self.omitted)
+        return markdown_table(found) + "".join(f"\n{NO_NUMBER} {note}\n" for note in notes)
 
     def confusion_matrix(
         self, predictor: str | None = None, *, fraction: float | None = None, normalise: bool = False, **part: str
@@ -195,7 +228,14 @@ class Evaluation:
             candidate_set=self.candidate_set,
             evaluation=self.definition,
         )
-        return table
+        return _with_notes(table, self.omitted)
+
+
+def _with_notes(table: pd.DataFrame, omitted: pd.DataFrame) -> pd.DataFrame:
+    """The table, whose attributes say which predictors are not in it."""
+    if len(omitted):
+        table.attrs["omitted"] = omission_notes(omitted)
+    return table
 
 
 def _square(confusion: Any, goals: Sequence[str]) -> Any:
@@ -219,6 +259,8 @@ class LearningCurve:
         ties: How ties count.
         candidate_set: Which goals count as possible.
         test_share: Share held out.
+        omitted: ``predictor, reason``: predictors that could not be evaluated on these trajectories, and why. They have
+            no rows in ``table``; :meth:`to_markdown` lists them.
     """
 
     table: pd.DataFrame = field(repr=False)
@@ -226,6 +268,7 @@ class LearningCurve:
     ties: str
     candidate_set: str
     test_share: float
+    omitted: pd.DataFrame = field(default_factory=omission_table, repr=False)
 
     @property
     def definition(self) -> str:
@@ -247,4 +290,13 @@ class LearningCurve:
         table.insert(3, "low", (table["accuracy"] - sd).clip(0, 1))
         table.insert(4, "high", (table["accuracy"] + sd).clip(0, 1))
         table.attrs.update(cut=self.cut, definition=CUTS[self.cut], evaluation=self.definition)
-        return table
+        return _with_notes(table, self.omitted)
+
+    def to_markdown(self) -> str:
+        """Accuracy (mean over fractions and repeats) by size as a Markdown table; dashes and reasons for the others."""
+        import pandas as pd
+
+        wide = self.summary().pivot_table(index="predictor", columns="size", values="accuracy", sort=False)
+        wide = wide.reindex([*wide.index, *self.omitted["predictor"]]).rename_axis("predictor").reset_index()
+        notes = omission_notes(self.omitted)
+        return markdown_table(pd.DataFrame(wide)) + "".join(f"\n{NO_NUMBER} {note}\n" for note in notes)

@@ -11,11 +11,24 @@ import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import Trajectory
 from legible_envs.support.validation import choice, integer, real
-from predictors.base import check_trajectories
+from predictors.base import TrajectoryError, check_trajectories
+from predictors.grid.base import check_recorded
 
-__all__ = ["Groups", "Split", "check_candidate_sets", "check_learnable", "folds", "nested_training_sets"]
+__all__ = [
+    "Groups",
+    "Rare",
+    "Split",
+    "check_candidate_sets",
+    "check_evaluable",
+    "check_groups",
+    "check_learnable",
+    "check_seed",
+    "folds",
+    "nested_training_sets",
+]
 
 Groups = Literal["participant"]
+Rare = Literal["error", "keep"]
 Split = tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]
 
 _GROUPS: Final[tuple[Groups | None, ...]] = ("participant", None)
@@ -27,7 +40,7 @@ def folds(
     rng: np.random.Generator,
     *,
     groups: Groups | None = None,
-    rare: Literal["error", "keep"] = "error",
+    rare: Rare = "error",
 ) -> Iterator[Split]:
     """Training and test numbers of a stratified k-fold split.
 
@@ -47,12 +60,12 @@ def folds(
     """
     from sklearn.model_selection import StratifiedGroupKFold, StratifiedKFold
 
-    goals = check_learnable(trajectories)
     cv = integer("cv", cv, 2, unit="folds")
+    choice("rare", rare, ("error", "keep"))
+    check_groups(trajectories, groups)
+    goals = check_learnable(trajectories)
     if len(trajectories) < cv:
         raise ValueError(f"{cv} folds need at least {cv} trajectories, got {len(trajectories)}")
-    choice("rare", rare, ("error", "keep"))
-    choice("groups", groups, _GROUPS)
     few = {goal: count for goal, count in sorted(Counter(goals).items()) if count < cv}
     if few and rare == "error":
         raise ValueError(
@@ -67,8 +80,6 @@ def folds(
         splitter: Any = StratifiedKFold(cv, shuffle=True, random_state=seed)
     else:
         participants = [trajectory.participant for trajectory in trajectories]
-        if "" in participants:
-            raise ValueError(f"trajectory {participants.index('')} names no participant to group by; use groups=None")
         if len(set(participants)) < cv:
             raise ValueError(f"{cv} folds need at least {cv} participants, got {len(set(participants))}")
         splitter = StratifiedGroupKFold(cv, shuffle=True, random_state=seed)
@@ -86,23 +97,61 @@ def _quietly(splitter: Any, goals: Sequence[str], participants: Sequence[str] | 
         return [(np.sort(a), np.sort(b)) for a, b in splitter.split(np.zeros(len(goals)), list(goals), participants)]
 
 
+def check_groups(trajectories: Sequence[Trajectory], groups: Groups | None) -> None:
+    """Check what is kept together, and that it has names.
+
+    Raises:
+        ValueError: Unknown groups, or a trajectory that names no participant to group by.
+    """
+    choice("groups", groups, _GROUPS)
+    if groups is not None:
+        unnamed = [number for number, trajectory in enumerate(trajectories) if not trajectory.participant]
+        if unnamed:
+            raise ValueError(f"trajectory {unnamed[0]} names no participant to group by; use groups=None")
+
+
+def check_seed(seed: int | np.random.Generator) -> np.random.Generator:
+    """The generator of a seed.
+
+    Raises:
+        ValueError: Neither a whole number >= 0 nor a generator; without one, no result could be repeated.
+    """
+    if isinstance(seed, np.random.Generator):
+        return seed
+    return np.random.default_rng(integer("seed", seed, 0, np.inf, also="a numpy Generator"))
+
+
+def check_evaluable(trajectories: Sequence[Trajectory]) -> list[str]:
+    """The goals of trajectories whose prediction can be evaluated.
+
+    Raises:
+        TypeError: Samples that are not trajectories.
+        TrajectoryError: A prefix, an unknown goal, or one that does not fit its kitchen (see
+            :func:`predictors.grid.base.check_whole`).
+        ValueError: No trajectories, or mixed candidate sets.
+    """
+    if not len(trajectories):
+        raise ValueError("no trajectories to evaluate on")
+    goals = []
+    for number, trajectory in enumerate(check_trajectories(trajectories)):
+        if trajectory.goal is None:
+            raise TrajectoryError(number, trajectory.participant, "it has no known goal to compare with")
+        if not trajectory.complete:
+            raise TrajectoryError(number, trajectory.participant, "it is a prefix; give complete trajectories")
+        goals.append(trajectory.goal)
+    check_candidate_sets(trajectories)
+    check_recorded(trajectories)
+    return goals
+
+
 def check_learnable(trajectories: Sequence[Trajectory]) -> list[str]:
     """The goals of trajectories between which there is something to tell apart.
 
     Raises:
         TypeError: Samples that are not trajectories.
-        ValueError: None, prefixes, unknown goals, mixed candidate sets, or one goal only.
+        ValueError: What :func:`check_evaluable` refuses, or one goal only.
     """
-    if not trajectories:
-        raise ValueError("no trajectories to evaluate on")
-    goals = []
-    for number, trajectory in enumerate(check_trajectories(trajectories)):
-        if trajectory.goal is None:
-            raise ValueError(f"trajectory {number} has no known goal to compare with")
-        if not trajectory.complete:
-            raise ValueError(f"trajectory {number} is a prefix; give complete trajectories")
-        goals.append(trajectory.goal)
-    check_candidate_sets(trajectories)
+    goals = check_evaluable(trajectories)
     if len(set(goals)) == 1:
         raise ValueError(f"all {len(goals)} trajectories go to {goals[0]!r}; there is nothing to tell apart")
     return goals
@@ -147,11 +196,13 @@ def nested_training_sets(
         ``(pool, test)``: learning from the first ``m`` of ``pool`` gives nested training sets.
 
     Raises:
-        ValueError: A share outside (0, 1), or a test set or pool of one goal.
+        ValueError: A share outside (0, 1), fewer than two trajectories or participants.
     """
     from sklearn.model_selection import GroupShuffleSplit
 
-    goals = np.array(check_learnable(trajectories))
+    goals = np.array(check_evaluable(trajectories))
+    if len(goals) < 2:
+        raise ValueError("a part can be held out of two trajectories or more, got 1")
     test_share = real("test_share", test_share, 0, 1, closed="neither")
     choice("groups", groups, _GROUPS)
     order = rng.permutation(len(trajectories))

@@ -2,18 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache
+from itertools import pairwise
+from typing import Final, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from legible_envs.overcooked.layout import FLOOR, OvercookedLayout
-from legible_envs.rollouts.trajectory import Trajectory
-from predictors.base import CandidatePredictor, GoalStream
+from legible_envs.rollouts.trajectory import Cut, Trajectory
+from predictors.base import FRACTIONS, CandidatePredictor, GoalStream, TrajectoryError, check_trajectories
 
-__all__ = ["GridPredictor", "check_complete", "check_trajectory", "goal_posterior", "remaining_steps"]
+__all__ = [
+    "GridPredictor",
+    "check_complete",
+    "check_recorded",
+    "check_trajectory",
+    "check_whole",
+    "goal_posterior",
+    "remaining_steps",
+]
 
+_FOUND_RIGHT: Final = "_is_whole_way"
 GoalCosts = Callable[[OvercookedLayout, tuple[str, ...]], npt.NDArray[np.float64]]
 
 
@@ -74,33 +85,86 @@ def _floor_of(layout: OvercookedLayout) -> frozenset[tuple[int, int]]:
     return frozenset((row, col) for row, col in np.argwhere(layout.cells == FLOOR).tolist())
 
 
-def check_complete(trajectory: Trajectory, number: int) -> OvercookedLayout:
-    """The kitchen of a complete trajectory: a known goal, no jumps, from a floor cell into the goal station.
+def check_whole(trajectory: Trajectory, number: int) -> OvercookedLayout:
+    """The kitchen of a complete trajectory, of which fractions have the meaning that results print.
+
+    It begins on a cell beside its start, if that is a station of the kitchen, goes step by step over floor cells, and
+    its last state is the goal station (a candidate, where the goal is not known).
 
     Args:
         trajectory: The trajectory.
         number: Its number, for error messages.
 
     Raises:
-        ValueError: Anything else (naming the cell).
+        TrajectoryError: Anything else (naming the cell).
     """
-    layout = check_trajectory(trajectory)
-    if trajectory.goal is None or not trajectory.complete:
-        raise ValueError(f"learning needs complete trajectories with known goals; trajectory {number} is not one")
-    cells = trajectory.states
-    if len(cells) < 2 or layout.station_at(cells[-1]) != trajectory.goal:
-        raise ValueError(
-            f"a complete trajectory ends with the cell of its goal station after one floor cell or more; trajectory "
-            f"{number} to {trajectory.goal!r} has the states {cells.tolist()}"
-        )
-    jumps = np.flatnonzero(np.abs(np.diff(cells, axis=0)).sum(axis=1) != 1)
-    if len(jumps):
-        (row, col), (to_row, to_col) = cells[jumps[0]].tolist(), cells[jumps[0] + 1].tolist()
-        raise ValueError(
-            f"trajectory {number} does not fit its layout: it goes from row {row}, column {col} to row {to_row}, "
-            f"column {to_col}, which is not one step"
-        )
+    # Every predictor of every fold asks again: what was found right is noted on the trajectory, which cannot change.
+    # Its prefixes share the note, and are told from it by not being complete.
+    if trajectory.complete and _FOUND_RIGHT in trajectory.__dict__:
+        return cast(OvercookedLayout, trajectory.layout)
+    try:
+        layout = check_trajectory(trajectory)
+        _check_way(trajectory, layout)
+    except ValueError as error:
+        raise TrajectoryError.of(number, trajectory, error) from error
+    trajectory.__dict__[_FOUND_RIGHT] = True
     return layout
+
+
+def _check_way(trajectory: Trajectory, layout: OvercookedLayout) -> None:
+    if not trajectory.complete:
+        raise ValueError("a complete trajectory is expected, and this is a prefix")
+    cells = trajectory.states.tolist()
+    last = layout.station_at(cells[-1]) if cells else None
+    if len(cells) < 2 or last is None or last != (trajectory.goal or last):
+        raise ValueError(
+            f"a complete trajectory ends with the cell of its goal station after one floor cell or more; this one to "
+            f"{trajectory.goal!r} has the states {_shortened(cells)}"
+        )
+    for (row, col), (to_row, to_col) in pairwise(cells):
+        if abs(to_row - row) + abs(to_col - col) != 1:
+            raise ValueError(
+                f"the trajectory does not fit its layout: it goes from row {row}, column {col} to row {to_row}, "
+                f"column {to_col}, which is not one step"
+            )
+    row, col = cells[0]
+    if trajectory.start in layout.stations and (row, col) not in layout.access(trajectory.start):
+        raise ValueError(
+            f"a trajectory begins on a cell beside the station that it starts from; row {row}, column {col} is not "
+            f"beside {trajectory.start!r}"
+        )
+
+
+def _shortened(cells: list[list[int]]) -> str:
+    return str(cells) if len(cells) <= 8 else f"[{str(cells[:4])[1:-1]}, …, {str(cells[-3:])[1:-1]}]"
+
+
+def check_complete(trajectory: Trajectory, number: int) -> OvercookedLayout:
+    """The kitchen of a trajectory that can be learned from: its goal is known, and it is whole.
+
+    Args:
+        trajectory: The trajectory.
+        number: Its number, for error messages.
+
+    Raises:
+        TrajectoryError: No known goal, or what :func:`check_whole` refuses.
+    """
+    if trajectory.goal is None or not trajectory.complete:
+        raise TrajectoryError(
+            number, trajectory.participant, "learning needs complete trajectories with known goals, and this is not one"
+        )
+    return check_whole(trajectory, number)
+
+
+def check_recorded(trajectories: Sequence[Trajectory]) -> None:
+    """Check complete trajectories in kitchens, before fractions of them are taken; others pass.
+
+    Raises:
+        TrajectoryError: What :func:`check_whole` refuses.
+    """
+    for number, trajectory in enumerate(trajectories):
+        if isinstance(trajectory.layout, OvercookedLayout) and trajectory.is_grid and trajectory.complete:
+            check_whole(trajectory, number)
 
 
 def goal_posterior(
@@ -138,6 +202,9 @@ def goal_posterior(
 class GridStream(GoalStream):
     """The belief about one person on a grid; each cell is checked once, by the predictor."""
 
+    def __init__(self, predictor: GridPredictor, context: Trajectory) -> None:
+        super().__init__(predictor, context, cells=True)
+
     def _observed(self) -> Trajectory:
         if not self._points:
             return self._context
@@ -147,6 +214,18 @@ class GridStream(GoalStream):
 class GridPredictor(CandidatePredictor):
     """A predictor on grids, one trajectory at a time; subclasses define ``candidate_probabilities``."""
 
-    def stream(self, context: Trajectory) -> GridStream:
+    def predict_proba_at(
+        self, X: Sequence[Trajectory], fractions: Sequence[float] = FRACTIONS, cut: Cut = "steps"
+    ) -> npt.NDArray[np.float64]:
+        """See :meth:`GoalPredictor.predict_proba_at`.
+
+        Raises:
+            TrajectoryError: Also a trajectory that jumps, does not begin beside its start, or does not end in its goal.
+        """
+        trajectories = check_trajectories(X)
+        check_recorded(trajectories)
+        return super().predict_proba_at(trajectories, fractions, cut)
+
+    def stream(self, context: Trajectory) -> GoalStream:
         """Predict one person's goal while they move; see :meth:`GoalPredictor.stream`."""
         return GridStream(self, context)

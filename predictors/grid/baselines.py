@@ -132,7 +132,7 @@ class GridLogistic(PrefixPredictor):
 
     def _check_parameters(self) -> None:
         real("C", self.C, 0, closed="neither")
-        real("max_iter", self.max_iter, 0, closed="neither")
+        integer("max_iter", self.max_iter, 1)
 
     def _learn(self, trajectories: Sequence[Trajectory]) -> None:
         from sklearn.linear_model import LogisticRegression

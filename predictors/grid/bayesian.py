@@ -15,13 +15,16 @@ from legible_envs.support.validation import choice, real
 from predictors.grid.base import GridPredictor, check_complete, goal_posterior, remaining_steps
 from predictors.grid.graphs import soft_costs, station_costs, walk_graph
 from predictors.grid.maxent_irl import MaxEntIRL
-from predictors.grid.priors import GoalPrior, Prior
+from predictors.grid.priors import PRIORS, GoalPrior, Prior
 from predictors.grid.walk_likelihood import best_uniform_cost, collect_evidence
 
 __all__ = ["BayesianGoalPredictor"]
 
 Costs = Literal["hard", "soft"]
 CellCosts = Literal["uniform", "learned"] | MaxEntIRL | npt.NDArray[np.float64]
+
+LARGEST_BETA: Final = 1e9
+"""A path that costs one step more is then impossible by any standard; beyond it, kernels take costs for infinite."""
 
 _MARGIN: Final = 0.25
 
@@ -81,13 +84,18 @@ class BayesianGoalPredictor(GridPredictor):
         self.cell_costs = cell_costs
         self.prior = prior
 
+    @property
+    def learns(self) -> bool:
+        """Whether costs, ``beta`` or the prior are learned in ``fit``."""
+        learned_costs = isinstance(self.cell_costs, MaxEntIRL | str) and self.cell_costs != "uniform"
+        return self.beta == "fit" or learned_costs or self.prior != "uniform"
+
     def fit(self, X: Sequence[Trajectory], y: object = None) -> Self:
         """Learn the names of the goals, and what the parameters leave to learning; see :meth:`GoalPredictor.fit`.
 
         Raises:
             ValueError: Bad parameters, no trajectories, or incomplete ones where costs or ``beta`` are learned.
         """
-        self._check_parameters()
         super().fit(X, y)
         trajectories = list(X)
         self._prior = GoalPrior(self.prior, trajectories, self.classes_)
@@ -111,8 +119,9 @@ class BayesianGoalPredictor(GridPredictor):
             if not isinstance(self.cell_costs, str) or self.cell_costs != "uniform":
                 raise ValueError("`beta='fit'` goes with uniform costs; learned costs are in nats: leave `beta` at 1")
         elif beta is not None:
-            real("beta", beta, 0, also="None, 'fit'")
+            real("beta", real("beta", beta, 0, also="None, 'fit'"), 0, LARGEST_BETA)
         choice("costs", self.costs, ("hard", "soft"))
+        choice("prior", self.prior, PRIORS)
         if isinstance(self.cell_costs, str) and self.cell_costs not in ("uniform", "learned"):
             raise ValueError(
                 f"`cell_costs` must be 'uniform', 'learned', a MaxEntIRL or an (H, W) array, got {self.cell_costs!r}"

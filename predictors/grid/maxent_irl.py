@@ -10,11 +10,11 @@ import numpy.typing as npt
 
 from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.rollouts.trajectory import Trajectory
-from legible_envs.support.validation import real
+from legible_envs.support.validation import choice, integer, real
 from predictors.base import check_trajectories
 from predictors.grid.base import GridPredictor, check_complete, goal_posterior
 from predictors.grid.graphs import soft_costs
-from predictors.grid.priors import GoalPrior, Prior
+from predictors.grid.priors import PRIORS, GoalPrior, Prior
 from predictors.grid.walk_likelihood import (
     Evidence,
     FeatureMap,
@@ -124,7 +124,6 @@ class MaxEntIRL(GridPredictor):
             ValueError: No trajectories, prefixes, trajectories that do not fit their layout (naming the cell), or bad
                 parameters.
         """
-        self._check_parameters()
         super().fit(X, y)
         trajectories = list(X)
         for number, trajectory in enumerate(trajectories):
@@ -164,8 +163,10 @@ class MaxEntIRL(GridPredictor):
     def _check_parameters(self) -> None:
         if isinstance(self.features, str) and self.features != "position":
             raise ValueError(f"`features` must be 'position', an array or a function, got {self.features!r}")
-        for name, least in (("l2", 0.0), ("tol", 0.0), ("max_iter", 0)):
-            real(name, getattr(self, name), least, closed="neither")
+        for name in ("l2", "tol"):
+            real(name, getattr(self, name), 0.0, closed="neither")
+        integer("max_iter", self.max_iter, 1)
+        choice("prior", self.prior, PRIORS)
 
     def _feature_map(self) -> FeatureMap:
         if callable(self.features):

@@ -97,7 +97,6 @@ class PrefixPredictor(GridPredictor):
             ValueError: No trajectories, prefixes, trajectories that do not fit their layout (naming the cell), or bad
                 parameters.
         """
-        self._check_parameters()
         super().fit(X, y)
         trajectories = list(X)
         for number, trajectory in enumerate(trajectories):
@@ -106,9 +105,6 @@ class PrefixPredictor(GridPredictor):
         self._prior_weights = self._prior.of(self.classes_.tolist())
         self._learn(trajectories)
         return self
-
-    def _check_parameters(self) -> None:
-        """Raise ``ValueError`` if a parameter is bad."""
 
     @abstractmethod
     def _learn(self, trajectories: Sequence[Trajectory]) -> None:

@@ -10,9 +10,10 @@ import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import Trajectory
 from legible_envs.support.validation import choice
-from predictors.base import TIE_TOLERANCE
+from predictors.base import TIE_TOLERANCE, GoalStream
 from predictors.grid.base import GridPredictor, check_trajectory, remaining_steps
 from predictors.reaching.base import goal_places, learn_places, straight_lines
+from predictors.reaching.features import check_positions
 
 __all__ = ["ShortestDistance"]
 
@@ -45,6 +46,18 @@ class ShortestDistance(GridPredictor):
     def __init__(self, metric: Metric = "manhattan") -> None:
         self.metric = metric
 
+    @property
+    def learns(self) -> bool:
+        """False: only names and places are learned."""
+        return False
+
+    def _check_parameters(self) -> None:
+        choice("metric", self.metric, get_args(Metric))
+
+    def stream(self, context: Trajectory) -> GoalStream:
+        """Predict one person's goal while they move; see :meth:`GoalPredictor.stream`."""
+        return GoalStream(self, context, cells=False) if self.metric == "euclidean" else super().stream(context)
+
     def fit(self, X: Sequence[Trajectory], y: object = None) -> Self:
         """Learn the goals' names (and places, for the Euclidean metric); see :meth:`GoalPredictor.fit`."""
         super().fit(X, y)
@@ -57,7 +70,7 @@ class ShortestDistance(GridPredictor):
         Raises:
             ValueError: An unknown metric, or a trajectory that does not fit its layout.
         """
-        choice("metric", self.metric, get_args(Metric))
+        self._check_parameters()
         if self.metric == "euclidean":
             return self._nearest(self._straight_lines(trajectory))
         layout = check_trajectory(trajectory)
@@ -82,6 +95,7 @@ class ShortestDistance(GridPredictor):
     def _straight_lines(self, trajectory: Trajectory) -> npt.NDArray[np.float64]:
         if not trajectory.num_states:
             return np.zeros(len(trajectory.candidates))
+        check_positions(trajectory)
         return straight_lines(trajectory.states[-1], goal_places(trajectory, self.places_))
 
     @staticmethod

@@ -17,8 +17,16 @@ import numpy.typing as npt
 from legible_envs.rollouts.trajectory import Cut, Trajectory
 from legible_envs.support.files import write_npz
 from legible_envs.support.validation import integer, real
-from predictors.base import FRACTIONS, GoalPredictor, GoalStream, check_trajectories
-from predictors.grid.base import check_trajectory
+from predictors.base import (
+    FRACTIONS,
+    GoalPredictor,
+    GoalStream,
+    TrajectoryError,
+    check_fractions,
+    check_trajectories,
+    prefix_lengths,
+)
+from predictors.grid.base import check_recorded, check_trajectory
 from predictors.neural.encoding import Encoding
 from predictors.neural.networks import NUMPY, Network, Weights, softmax
 from predictors.neural.training import Examples, Training, require_torch, train
@@ -121,6 +129,7 @@ class NeuralPredictor(GoalPredictor):
         trajectories = check_trajectories(X)
         super().fit(trajectories)
         self.goal_columns(trajectories)
+        check_recorded(trajectories)
         encoding = Encoding.learn(trajectories)
         self._check_layouts(trajectories)
         require_torch()
@@ -143,8 +152,9 @@ class NeuralPredictor(GoalPredictor):
         self, X: Sequence[Trajectory], fractions: Sequence[float] = FRACTIONS, cut: Cut = "steps"
     ) -> npt.NDArray[np.float64]:
         """See :meth:`GoalPredictor.predict_proba_at`; one pass over each trajectory, as the networks are causal."""
-        trajectories = check_trajectories(X)
-        lengths = [[trajectory.prefix_length(fraction, cut) for fraction in fractions] for trajectory in trajectories]
+        trajectories, fractions = check_trajectories(X), check_fractions(fractions, cut)
+        check_recorded(trajectories)
+        lengths = prefix_lengths(trajectories, fractions, cut)
         after = self._beliefs(
             [trajectory.first(max(row, default=0)) for trajectory, row in zip(trajectories, lengths, strict=True)]
         )
@@ -190,7 +200,8 @@ class NeuralPredictor(GoalPredictor):
         """
         name = os.fspath(path)
         try:
-            with np.load(path, allow_pickle=False) as file:
+            # Opened here, so that it is closed where it turns out to be no archive.
+            with open(path, "rb") as source, np.load(source, allow_pickle=False) as file:
                 if not isinstance(file, np.lib.npyio.NpzFile) or "kind" not in file or str(file["kind"]) != _KIND:
                     raise ValueError("it is not a file of a neural predictor")
                 if int(file["schema"]) > SCHEMA:
@@ -227,6 +238,9 @@ class NeuralPredictor(GoalPredictor):
 
     # -- inside -------------------------------------------------------------------------------------------------------
 
+    def _check_parameters(self) -> None:
+        self._settings()
+
     def _settings(self) -> Training:
         for name in (*self._sizes, "members", "batch_size", "max_epochs", "patience"):
             integer(name, getattr(self, name), 1)
@@ -254,9 +268,12 @@ class NeuralPredictor(GoalPredictor):
 
     @staticmethod
     def _check_layouts(trajectories: Sequence[Trajectory]) -> None:
-        for trajectory in trajectories:
+        for number, trajectory in enumerate(trajectories):
             if trajectory.layout is not None and trajectory.is_grid:
-                check_trajectory(trajectory)
+                try:
+                    check_trajectory(trajectory)
+                except ValueError as error:
+                    raise TrajectoryError.of(number, trajectory, error) from error
 
     def _learn_prior(self, trajectories: Sequence[Trajectory]) -> npt.NDArray[np.float64]:
         chosen = np.bincount(self.goal_columns(trajectories), minlength=len(self.classes_)) + 1.0
@@ -280,8 +297,11 @@ class NeuralPredictor(GoalPredictor):
         """For each trajectory ``(T+1, K)``: the belief after 0, 1, …, T states."""
         self._check_fitted()
         allowed = self._allowed(trajectories)
-        for trajectory in trajectories:
-            self.encoding_.check(trajectory)
+        for number, trajectory in enumerate(trajectories):
+            try:
+                self.encoding_.check(trajectory)
+            except ValueError as error:
+                raise TrajectoryError.of(number, trajectory, error) from error
         self._check_layouts(trajectories)
         found: list[npt.NDArray[np.float64]] = [np.zeros(0)] * len(trajectories)
         by_length = sorted(range(len(trajectories)), key=lambda i: trajectories[i].num_states)
@@ -315,8 +335,8 @@ class NeuralStream(GoalStream):
     """
 
     def __init__(self, predictor: NeuralPredictor, context: Trajectory) -> None:
-        super().__init__(predictor, context)
         predictor._check_fitted()
+        super().__init__(predictor, context, cells=predictor.encoding_.grid)
         self._neural = predictor
         self._network = predictor._network()
         self._known = predictor.encoding_.context(context)

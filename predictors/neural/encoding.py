@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Self
+from typing import Any, Final, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -13,7 +13,8 @@ from legible_envs.rollouts.trajectory import Trajectory
 
 __all__ = ["Encoding"]
 
-_SMALLEST = 1e-12
+_SMALLEST: Final = 1e-12
+_MOST_CELLS: Final = 256 * 256
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,8 @@ class Encoding:
         """Choose the encoding of trajectories of one kind, of which at least one is not empty.
 
         Raises:
-            ValueError: Cells mixed with positions, different dimensions, or cells that are not ``(row, col)``.
+            ValueError: Cells mixed with positions, different dimensions, or cells that are not ``(row, col)`` or of no
+                grid that a network could be given.
         """
         seen = [trajectory for trajectory in trajectories if trajectory.num_states]
         if not seen:
@@ -61,6 +63,8 @@ class Encoding:
         if grid and dimension != 2:
             raise ValueError(f"expected (row, col) cells, got {dimension}-d ones")
         states = np.concatenate([trajectory.states for trajectory in seen])
+        if grid:
+            _check_cells(states)
         offsets = np.concatenate([trajectory.states - trajectory.states[0] for trajectory in seen])
         moves = np.concatenate([np.diff(trajectory.states, axis=0) for trajectory in seen])
         layouts = {_layout_name(trajectory) for trajectory in seen}
@@ -136,6 +140,19 @@ class Encoding:
         """The encoding that :meth:`to_config` described."""
         values: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in config.items()}
         return cls(**values)
+
+
+def _check_cells(cells: npt.NDArray[np.int64]) -> None:
+    """Refuse cells of no grid, or of one too large for a number per cell."""
+    bad = cells[(cells < 0).any(axis=1)]
+    if not len(bad) and np.prod(cells.max(axis=0) + 1.0) > _MOST_CELLS:
+        bad = cells[cells.max(axis=1).argmax()][None]
+    if len(bad):
+        row, col = bad[0].tolist()
+        raise ValueError(
+            f"expected cells of a grid of at most {_MOST_CELLS} cells, rows and columns from 0 on; got row {row}, "
+            f"column {col}"
+        )
 
 
 def _root_mean_square(vectors: npt.NDArray[Any]) -> float:

@@ -10,7 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import Trajectory
-from predictors.base import CandidatePredictor
+from predictors.base import CandidatePredictor, GoalStream
+from predictors.reaching.features import check_positions
 
 __all__ = ["PlacePredictor", "goal_places", "learn_places", "straight_lines"]
 
@@ -45,17 +46,18 @@ def goal_places(trajectory: Trajectory, learned: Places) -> npt.NDArray[np.float
             of another dimension than the states.
     """
     if trajectory.goal_positions is not None:
-        return np.array(trajectory.goal_positions)
+        return _of_dimension(np.array(trajectory.goal_positions), trajectory, "of the goal positions")
     missing = [goal for goal in trajectory.candidates if goal not in learned]
     if missing:
         raise ValueError(
             f"unknown places of {missing}: the trajectory has no `goal_positions`, and no reach in `fit` ended there"
         )
-    places = np.array([learned[goal] for goal in trajectory.candidates])
+    return _of_dimension(np.array([learned[goal] for goal in trajectory.candidates]), trajectory, "as in `fit`")
+
+
+def _of_dimension(places: npt.NDArray[np.float64], trajectory: Trajectory, whose: str) -> npt.NDArray[np.float64]:
     if trajectory.num_states and places.shape[1] != trajectory.states.shape[1]:
-        raise ValueError(
-            f"expected states of dimension {places.shape[1]} as in `fit`, got {trajectory.states.shape[1]}"
-        )
+        raise ValueError(f"expected states of dimension {places.shape[1]} {whose}, got {trajectory.states.shape[1]}")
     return places
 
 
@@ -74,6 +76,11 @@ class PlacePredictor(CandidatePredictor):
         places_: ``(d,)`` place of each goal that reaches ended at in ``fit``.
     """
 
+    @property
+    def learns(self) -> bool:
+        """Whether a subclass learns more in ``fit`` than names and places."""
+        return type(self).fit is not PlacePredictor.fit
+
     def fit(self, X: Sequence[Trajectory], y: object = None) -> Self:
         """Learn the goals' names and where reaches to them end; see :meth:`GoalPredictor.fit`."""
         super().fit(X, y)
@@ -90,5 +97,10 @@ class PlacePredictor(CandidatePredictor):
 
     def candidate_probabilities(self, trajectory: Trajectory) -> npt.NDArray[np.float64]:
         """See :meth:`CandidatePredictor.candidate_probabilities`; all alike before the first state."""
+        check_positions(trajectory)
         weights = self.weigh_trajectory(trajectory) if trajectory.num_states else np.ones(len(trajectory.candidates))
         return weights / weights.sum()
+
+    def stream(self, context: Trajectory) -> GoalStream:
+        """Predict one person's goal while they move; see :meth:`GoalPredictor.stream`."""
+        return GoalStream(self, context, cells=False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from typing import Any, Self
+from typing import Any, Final, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -15,10 +15,19 @@ from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
 from legible_envs.rollouts.trajectory import Cut, Trajectory
 from legible_envs.support.validation import choice, integer, real
-from predictors.base import FRACTIONS, GoalPredictor, check_trajectories
-from predictors.reaching.features import Reach, check_dimension, check_reaches
+from predictors.base import (
+    FRACTIONS,
+    GoalPredictor,
+    GoalStream,
+    check_fractions,
+    check_trajectories,
+    prefix_lengths,
+)
+from predictors.reaching.features import Reach, check_reach, check_reaches
 
 __all__ = ["ReachLogistic", "ReachNeighbours"]
+
+_LEAST_SCALE: Final = 1e-9
 
 
 class _MomentClassifier(GoalPredictor):
@@ -49,6 +58,10 @@ class _MomentClassifier(GoalPredictor):
         self._classifier = self._make(len(labels)).fit(np.concatenate(moments), labels) if len(counts) > 1 else None
         return self
 
+    def stream(self, context: Trajectory) -> GoalStream:
+        """Predict one person's goal while they move; see :meth:`GoalPredictor.stream`."""
+        return GoalStream(self, context, cells=False)
+
     @abstractmethod
     def _make(self, moments: int) -> Any:
         """An unfitted classifier for so many moments."""
@@ -61,9 +74,9 @@ class _MomentClassifier(GoalPredictor):
         """See :meth:`GoalPredictor.predict_proba`."""
         trajectories = check_trajectories(X)
         rows: list[npt.NDArray[np.float64] | None] = []
-        for trajectory in trajectories:
+        for number, trajectory in enumerate(trajectories):
             self.candidate_columns(trajectory)
-            check_dimension(trajectory, self.n_dims_)
+            check_reach(trajectory, number, self.n_dims_)
             rows.append(_moments(trajectory)[-1] if trajectory.num_states > 1 else None)
         return self._beliefs(trajectories, rows)
 
@@ -71,13 +84,13 @@ class _MomentClassifier(GoalPredictor):
         self, X: Sequence[Trajectory], fractions: Sequence[float] = FRACTIONS, cut: Cut = "steps"
     ) -> npt.NDArray[np.float64]:
         """See :meth:`GoalPredictor.predict_proba_at`; features of a reach are computed once for all fractions."""
-        trajectories = check_trajectories(X)
-        rows: list[npt.NDArray[np.float64] | None] = []
+        trajectories, fractions = check_trajectories(X), check_fractions(fractions, cut)
         for trajectory in trajectories:
             self.candidate_columns(trajectory)
-            check_dimension(trajectory, self.n_dims_)
-            moments = _moments(trajectory)
-            lengths = [trajectory.prefix_length(fraction, cut) for fraction in fractions]
+        rows: list[npt.NDArray[np.float64] | None] = []
+        for number, lengths in enumerate(prefix_lengths(trajectories, fractions, cut)):
+            check_reach(trajectories[number], number, self.n_dims_)
+            moments = _moments(trajectories[number])
             rows += [moments[length - 1] if length > 1 else None for length in lengths]
         beliefs = self._beliefs([trajectory for trajectory in trajectories for _ in fractions], rows)
         return beliefs.reshape(len(trajectories), len(fractions), len(self.classes_))
@@ -104,6 +117,17 @@ class _MomentClassifier(GoalPredictor):
         return probabilities
 
 
+class _Scaler(StandardScaler):
+    """Standardises features, but does not blow up those that hardly vary: their squares would not be finite."""
+
+    scale_: npt.NDArray[np.float64]
+
+    def fit(self, X: Any, y: Any = None, sample_weight: Any = None) -> Self:
+        super().fit(X, y, sample_weight)
+        self.scale_ = np.maximum(self.scale_, _LEAST_SCALE)
+        return self
+
+
 class ReachLogistic(_MomentClassifier):
     """Multinomial logistic regression on position, velocity and time.
 
@@ -123,12 +147,14 @@ class ReachLogistic(_MomentClassifier):
         self.degree = degree
         self.max_iter = max_iter
 
-    def _make(self, moments: int) -> Any:
+    def _check_parameters(self) -> None:
         choice("degree", self.degree, (1, 2))
         real("C", self.C, 0, closed="neither")
         integer("max_iter", self.max_iter, 1)
-        expand = PolynomialFeatures(self.degree, include_bias=False)
-        return make_pipeline(StandardScaler(), expand, LogisticRegression(C=self.C, max_iter=self.max_iter))
+
+    def _make(self, moments: int) -> Any:
+        expand = PolynomialFeatures(int(self.degree), include_bias=False)
+        return make_pipeline(_Scaler(), expand, LogisticRegression(C=self.C, max_iter=self.max_iter))
 
 
 class ReachNeighbours(_MomentClassifier):
@@ -148,9 +174,12 @@ class ReachNeighbours(_MomentClassifier):
     def __init__(self, n_neighbors: int = 25) -> None:
         self.n_neighbors = n_neighbors
 
+    def _check_parameters(self) -> None:
+        integer("n_neighbors", self.n_neighbors, 1)
+
     def _make(self, moments: int) -> Any:
-        self.n_neighbors_ = min(integer("n_neighbors", self.n_neighbors, 1), moments)
-        return make_pipeline(StandardScaler(), KNeighborsClassifier(self.n_neighbors_))
+        self.n_neighbors_ = min(int(self.n_neighbors), moments)
+        return make_pipeline(_Scaler(), KNeighborsClassifier(self.n_neighbors_))
 
     def _smoothed(self, weights: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         return (self.n_neighbors_ * weights + self.prior_) / (self.n_neighbors_ + 1)

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Self
-
 import numpy as np
 import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import Trajectory
-from legible_envs.support.validation import real
+from legible_envs.support.validation import flag, real
 from legible_envs.tabletop.layout import TabletopLayout
 from predictors.reaching.base import PlacePredictor, straight_lines
 
@@ -49,13 +46,9 @@ class StraightLineBayesian(PlacePredictor):
         self.beta = beta
         self.obstacles = obstacles
 
-    def fit(self, X: Sequence[Trajectory], y: object = None) -> Self:
-        """Learn the goals' names and places; see :meth:`GoalPredictor.fit`."""
-        self._check_beta()
-        return super().fit(X, y)
-
-    def _check_beta(self) -> None:
+    def _check_parameters(self) -> None:
         real("beta", self.beta, 0)
+        flag("obstacles", self.obstacles)
 
     def weigh_trajectory(self, trajectory: Trajectory) -> npt.NDArray[np.float64]:
         """See :meth:`PlacePredictor.weigh_trajectory`.
@@ -67,8 +60,8 @@ class StraightLineBayesian(PlacePredictor):
             return super().weigh_trajectory(trajectory)
         from legible_envs.tabletop.partner.belief import GoalBelief
 
-        self._check_beta()
-        if trajectory.is_grid or trajectory.states.shape[1] != 2:
+        self._check_parameters()
+        if trajectory.states.shape[1] != 2:
             raise ValueError(
                 f"expected positions (x, y) on a table, got {trajectory.states.shape[1]}-d {trajectory.states.dtype}"
             )
@@ -83,6 +76,7 @@ class StraightLineBayesian(PlacePredictor):
 
     def weigh(self, states: npt.NDArray[np.floating], places: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """See :meth:`PlacePredictor.weigh`."""
-        self._check_beta()
+        self._check_parameters()
         excess = straight_lines(states[-1], places) - straight_lines(states[0], places)
-        return np.exp(-self.beta * (excess - excess.min()))
+        with np.errstate(over="ignore"):  # beyond every number is 0 after exp
+            return np.exp(-self.beta * (excess - excess.min()))

@@ -3,23 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Self
+from typing import Final, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import Trajectory
+from predictors.base import TrajectoryError
 
-__all__ = ["Reach", "check_dimension", "check_reaches", "resample"]
+__all__ = ["SAME_MOMENT", "SHORTEST", "Reach", "check_positions", "check_reach", "check_reaches", "resample"]
 
 _Array = npt.NDArray[np.float64]
+
+SAME_MOMENT: Final = 1e-9
+"""Seconds within which two samples count as of one moment: speeds between them would have no meaning."""
+
+SHORTEST: Final = 1e-6
+"""Seconds that a reach to learn from must last."""
 
 
 class Reach:
     """A trajectory relative to where and when it began.
 
     Velocities look backwards only, so that those of a prefix are a prefix of the velocities: the first sample's is 0,
-    and two samples at the same moment share one.
+    and two samples at the same moment (within :data:`SAME_MOMENT`) share one.
 
     Attributes:
         points: ``(T, d)`` positions from the first.
@@ -51,7 +58,7 @@ class Reach:
         gaps = np.diff(self.times)
         for i in np.flatnonzero(gaps >= 0):
             moved = self.points[i + 1] - self.points[i]
-            velocities[i + 1] = moved / gaps[i] if gaps[i] > 0 else velocities[i]
+            velocities[i + 1] = moved / gaps[i] if gaps[i] > SAME_MOMENT else velocities[i]
         return np.concatenate([self.points, velocities], axis=1)
 
     def append(self, point: tuple[float, ...], time: float, velocity: bool) -> tuple[_Array, float, float]:
@@ -67,7 +74,7 @@ class Reach:
         gap, speed = 0.0, np.zeros_like(here)
         if self._last is not None:
             gap = when - self._last[1]
-            speed = (here - self._last[0]) / gap if gap > 0 else self._last[2]
+            speed = (here - self._last[0]) / gap if gap > SAME_MOMENT else self._last[2]
         self._last = here, when, speed
         return (np.concatenate([here, speed]) if velocity else here)[None], when, gap
 
@@ -91,26 +98,52 @@ def check_reaches(trajectories: Sequence[Trajectory]) -> int:
     """The dimension of reaches that can be learned from.
 
     Raises:
-        ValueError: An unknown goal, a prefix, fewer than two states, no duration, or mixed dimensions.
+        TrajectoryError: An unknown goal, a prefix, cells, fewer than two states, no duration, or another dimension.
     """
+    dimension = int(trajectories[0].states.shape[1])
     for number, trajectory in enumerate(trajectories):
-        if trajectory.goal is None:
-            raise ValueError(f"reach {number} has no known goal to learn from")
-        if not trajectory.complete:
-            raise ValueError(f"reach {number} is a prefix; `fit` learns from complete reaches")
-        if trajectory.num_states < 2 or not trajectory.times[-1] > trajectory.times[0]:
-            raise ValueError(
-                f"reach {number} has {trajectory.num_states} states and no duration; it needs at least 2 and some"
-            )
-        if trajectory.states.shape[1] != trajectories[0].states.shape[1]:
-            raise ValueError(
-                f"all reaches must have one dimension; reach 0 has {trajectories[0].states.shape[1]}, reach {number} "
-                f"has {trajectory.states.shape[1]}"
-            )
-    return int(trajectories[0].states.shape[1])
+        try:
+            if trajectory.goal is None:
+                raise ValueError("it has no known goal to learn from")
+            if not trajectory.complete:
+                raise ValueError("it is a prefix; `fit` learns from complete reaches")
+            check_positions(trajectory)
+            duration = float(trajectory.times[-1] - trajectory.times[0]) if trajectory.num_states else 0.0
+            if trajectory.num_states < 2 or duration < SHORTEST:
+                count = f"{trajectory.num_states} state{'s' * (trajectory.num_states != 1)}"
+                lasts = f"lasts {duration:.3g} s" if duration else "no duration"
+                raise ValueError(f"the reach has {count} and {lasts}; it needs at least 2 and {SHORTEST:g} s")
+            if trajectory.states.shape[1] != dimension:
+                raise ValueError(
+                    f"all reaches must have one dimension; the first has {dimension}, this one "
+                    f"{trajectory.states.shape[1]}"
+                )
+        except ValueError as error:
+            raise TrajectoryError.of(number, trajectory, error) from error
+    return dimension
 
 
-def check_dimension(trajectory: Trajectory, dimension: int) -> None:
-    """Refuse states of another dimension than those learned from."""
-    if trajectory.num_states and trajectory.states.shape[1] != dimension:
-        raise ValueError(f"expected states of dimension {dimension} as in `fit`, got {trajectory.states.shape[1]}")
+def check_positions(trajectory: Trajectory) -> None:
+    """Refuse cells: on a grid standing still is left out, so that speeds and durations would be others.
+
+    Raises:
+        ValueError: States that are integers.
+    """
+    if trajectory.num_states and trajectory.is_grid:
+        raise ValueError(
+            "the states are integers, which are cells of a grid; give positions in metres or pixels as floats"
+        )
+
+
+def check_reach(trajectory: Trajectory, number: int, dimension: int) -> None:
+    """Refuse states that are no positions of the dimension learned from.
+
+    Raises:
+        TrajectoryError: Cells, or another dimension.
+    """
+    try:
+        check_positions(trajectory)
+        if trajectory.num_states and trajectory.states.shape[1] != dimension:
+            raise ValueError(f"expected states of dimension {dimension} as in `fit`, got {trajectory.states.shape[1]}")
+    except ValueError as error:
+        raise TrajectoryError.of(number, trajectory, error) from error

@@ -9,10 +9,18 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import Cut, Trajectory
-from legible_envs.support.validation import choice, integer, real
-from predictors.base import FRACTIONS, GoalPredictor, GoalStream, check_trajectories
+from legible_envs.support.validation import choice, flag, integer, real
+from predictors.base import (
+    FRACTIONS,
+    GoalPredictor,
+    GoalStream,
+    TrajectoryError,
+    check_fractions,
+    check_trajectories,
+    prefix_lengths,
+)
 from predictors.reaching.alignment_kernels import dba_step, match_means, pairwise_costs
-from predictors.reaching.features import Reach, check_dimension, check_reaches, resample
+from predictors.reaching.features import Reach, check_reach, check_reaches, resample
 from predictors.reaching.open_end_kernels import observe
 
 __all__ = ["ReachStream", "TimeSeriesGaussian"]
@@ -21,6 +29,8 @@ Alignment = Literal["none", "mean", "medoid", "dba"]
 Online = Literal["open-end", "index", "fraction"]
 
 _DBA_ITERATIONS: Final = 10
+_LEAST_FLOOR: Final = 1e-6
+_WORST_CONDITION: Final = 1e13
 
 
 class TimeSeriesGaussian(GoalPredictor):
@@ -49,7 +59,7 @@ class TimeSeriesGaussian(GoalPredictor):
             reach is going on.
         band: How far warping may move a sample from where the clock says, as a share of the reach, offline and online;
             None: anywhere.
-        floor: Standard deviation added to every position, in metres.
+        floor: Standard deviation added to every position, in metres; 1e-6 at least.
         velocity_floor: The same for velocities, in metres per second.
         half_life: Seconds after which a sample counts half; None: all samples count the same; 0: only the newest.
 
@@ -106,9 +116,10 @@ class TimeSeriesGaussian(GoalPredictor):
             y: Ignored; goals are part of the trajectories.
 
         Raises:
-            ValueError: Parameters out of range; a prefix, an unknown goal, a reach of one state, mixed dimensions.
+            ValueError: Parameters out of range; a prefix, an unknown goal, cells, a reach of one state or without
+                duration, mixed dimensions; positions that spread so far beside ``floor`` that covariances have no
+                inverse.
         """
-        self._check_parameters()
         super().fit(X, y)
         trajectories = list(X)
         self.n_dims_ = check_reaches(trajectories)
@@ -121,6 +132,7 @@ class TimeSeriesGaussian(GoalPredictor):
         aligned = [self._aligned(by_goal[goal]) for goal in self.goals_]
         self.means_ = np.array([series.mean(axis=0) for series in aligned])
         self.covariances_ = self._covariances(aligned)
+        self._check_covariances()
         self._precisions: npt.NDArray[np.float64] = np.linalg.inv(self.covariances_).astype(np.float64)
         width = self.means_.shape[2]
         self._log_norms = -0.5 * (np.linalg.slogdet(self.covariances_)[1] + width * np.log(2 * np.pi))
@@ -153,6 +165,16 @@ class TimeSeriesGaussian(GoalPredictor):
         found = [s / n if n else pooled for s, n in zip(sums, freedom, strict=True)]
         return np.array(found) + np.diag(floors**2)
 
+    def _check_covariances(self) -> None:
+        """Refuse covariances whose inverse would be rounding errors."""
+        spread = np.sqrt(np.diagonal(self.covariances_, axis1=2, axis2=3))
+        worst = np.linalg.cond(self.covariances_ / (spread[..., None] * spread[..., None, :])).max()
+        if not worst < _WORST_CONDITION:
+            raise ValueError(
+                f"positions spread up to {spread.max():.3g} along a line, beside which `floor` ({self.floor:g}) and "
+                f"`velocity_floor` ({self.velocity_floor:g}) vanish; raise these, or give positions in metres"
+            )
+
     def _radius(self) -> int:
         """Half-width of the band in steps; -1: none."""
         return -1 if self.band is None else int(self.band * self.n_samples)
@@ -163,8 +185,9 @@ class TimeSeriesGaussian(GoalPredictor):
         choice("online", self.online, ("open-end", "index", "fraction"))
         if self.band is not None:
             real("band", self.band, 0, 1, also="None")
-        real("floor", self.floor, 0, closed="neither")
-        real("velocity_floor", self.velocity_floor, 0, closed="neither")
+        flag("velocity", self.velocity)
+        for name in ("floor", "velocity_floor"):
+            real(name, real(name, getattr(self, name), 0, closed="neither"), _LEAST_FLOOR)
         if self.half_life is not None:
             real("half_life", self.half_life, 0, also="None")
 
@@ -180,10 +203,13 @@ class TimeSeriesGaussian(GoalPredictor):
         columns = [self.candidate_columns(trajectory) for trajectory in trajectories]
         probabilities = np.zeros((len(trajectories), len(self.classes_)))
         for row, trajectory in enumerate(trajectories):
+            check_reach(trajectory, row, self.n_dims_)
             if self.online == "fraction" and not trajectory.complete and trajectory.num_states > 1:
-                raise ValueError(
+                raise TrajectoryError(
+                    row,
+                    trajectory.participant,
                     "online='fraction' needs the duration of the whole reach, which a prefix lacks; use "
-                    "`predict_proba_at`, or online='open-end' for motion that is still going on"
+                    "`predict_proba_at`, or online='open-end' for motion that is still going on",
                 )
             duration = float(trajectory.times[-1] - trajectory.times[0]) if trajectory.num_states else 0.0
             scores = self._scores(trajectory, duration)
@@ -194,16 +220,17 @@ class TimeSeriesGaussian(GoalPredictor):
         self, X: Sequence[Trajectory], fractions: Sequence[float] = FRACTIONS, cut: Cut = "steps"
     ) -> npt.NDArray[np.float64]:
         """See :meth:`GoalPredictor.predict_proba_at`; one pass over each reach answers all fractions."""
-        trajectories = check_trajectories(X)
+        trajectories, fractions = check_trajectories(X), check_fractions(fractions, cut)
+        columns = [self.candidate_columns(trajectory) for trajectory in trajectories]
         probabilities = np.zeros((len(trajectories), len(fractions), len(self.classes_)))
-        for row, trajectory in enumerate(trajectories):
-            columns = self.candidate_columns(trajectory)
-            lengths = [trajectory.prefix_length(fraction, cut) for fraction in fractions]
+        for row, lengths in enumerate(prefix_lengths(trajectories, fractions, cut)):
+            trajectory = trajectories[row]
+            check_reach(trajectory, row, self.n_dims_)
             scores = self._scores(
                 trajectory.first(max(lengths, default=0)), float(trajectory.times[-1] - trajectory.times[0])
             )
             for i, length in enumerate(lengths):
-                probabilities[row, i, columns] = self._belief(scores[length - 1], trajectory.candidates)
+                probabilities[row, i, columns[row]] = self._belief(scores[length - 1], trajectory.candidates)
         return probabilities
 
     def stream(self, context: Trajectory) -> GoalStream:
@@ -218,7 +245,6 @@ class TimeSeriesGaussian(GoalPredictor):
 
     def _scores(self, trajectory: Trajectory, duration: float) -> npt.NDArray[np.float64]:
         """``(T, G)`` mean log-density of the samples so far, after each sample."""
-        check_dimension(trajectory, self.n_dims_)
         if not trajectory.num_states:
             return np.zeros((0, len(self.goals_)))
         reach = Reach(trajectory)
@@ -266,7 +292,8 @@ class TimeSeriesGaussian(GoalPredictor):
         """The factor of earlier samples' weight after so many seconds."""
         if self.half_life is None:
             return np.ones_like(gaps)
-        return np.exp2(-gaps / self.half_life) if self.half_life > 0 else np.zeros_like(gaps)
+        with np.errstate(over="ignore"):  # after more half-lives than any number nothing is left
+            return np.exp2(-gaps / self.half_life) if self.half_life > 0 else np.zeros_like(gaps)
 
     def _belief(self, scores: npt.NDArray[np.float64] | None, candidates: Sequence[str]) -> npt.NDArray[np.float64]:
         """``(len(candidates),)`` probabilities in their order."""
@@ -283,7 +310,7 @@ class ReachStream(GoalStream):
     """A stream that keeps the alignment so far instead of the samples' past."""
 
     def __init__(self, predictor: TimeSeriesGaussian, context: Trajectory) -> None:
-        super().__init__(predictor, context)
+        super().__init__(predictor, context, cells=False)
         self._gaussian = predictor
         self._state = np.zeros((3, *predictor._log_norms.shape))
         self._scores: npt.NDArray[np.float64] | None = None

@@ -434,7 +434,7 @@ def test_options_of_predictors_need_them(arguments: tuple[str, ...], message: st
 def test_unknown_predictors_and_too_few_walks_are_said_in_a_line(walks_of_run: Path, run: Path) -> None:
     for arguments, message in (
         (("--predictor", "nobody"), "nobody"),
-        (("--predictor", "bayesian", "--folds", 1000), "1000 folds need at least"),
+        (("--predictor", "grid-ngram", "--folds", 1000), "1000 folds need at least"),
     ):
         result = legible("score", run, "--trajectories", walks_of_run, *arguments)
         assert result.exit_code == 2, result.output

@@ -389,7 +389,7 @@ def test_a_point_that_does_not_fit_is_not_part_of_the_way(on_cells: NeuralPredic
     before = stream.belief
     with pytest.raises(ValueError, match="row 0, column 0"):
         stream.update((0, 0))
-    with pytest.raises(ValueError, match="this trajectory has 2-d positions"):
+    with pytest.raises(ValueError, match="expected a point that is a cell"):
         stream.update((2.5, 2.0))
     assert stream.belief == before
     assert stream.update((2, 2)) == pytest.approx(

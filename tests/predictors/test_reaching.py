@@ -86,12 +86,12 @@ def test_positions_must_be_finite() -> None:
     [
         (TRAIN[0].first(5), "is a prefix"),
         (Trajectory(np.zeros((3, 2)), candidates=NAMES), "no known goal"),
-        (Trajectory(np.zeros((1, 2)), candidates=NAMES, goal="left"), "1 states and no duration"),
+        (Trajectory(np.zeros((1, 2)), candidates=NAMES, goal="left"), "1 state and no duration"),
         (Trajectory(np.zeros((3, 2)), np.zeros(3), candidates=NAMES, goal="left"), "no duration"),
     ],
 )
 def test_learns_from_complete_reaches_only(predictor: GoalPredictor, bad: Trajectory, message: str) -> None:
-    with pytest.raises(ValueError, match=rf"reach 1 .*{message}"):
+    with pytest.raises(ValueError, match=rf"trajectory 1.*{message}"):
         predictor.fit([TRAIN[0], bad])
 
 

@@ -91,7 +91,7 @@ def test_the_check_says_what_is_wrong() -> None:
         check_predictor(Sloppy)
     assert "parameters" in str(caught.value)
     assert "fit: must return self, returned NoneType" in str(caught.value)
-    with pytest.raises(PredictorError, match="without being candidates"):
+    with pytest.raises(PredictorError, match="without being one of its candidates"):
         check_predictor(Spreading)
     with pytest.raises(PredictorError, match="depends on the other samples"):
         check_predictor(Crowd, example_trajectories()[:4])

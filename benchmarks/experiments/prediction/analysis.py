@@ -77,12 +77,15 @@ def compare_with_reference(scores: pd.DataFrame) -> pd.DataFrame:
 
 
 def reference_rows(scores: pd.DataFrame) -> list[dict[str, str]]:
-    """:func:`compare_with_reference` for reading: a row per predictor, per kitchen its accuracy and the difference."""
+    """:func:`compare_with_reference` for reading: a row per predictor, per kitchen its accuracy and the difference.
+
+    Where a predictor could not be evaluated there is a dash.
+    """
     table = compare_with_reference(scores)
     repeats = scores.groupby("predictor", sort=False)["repeats"].first()
     rows = []
     for predictor, part in table.groupby("predictor", sort=False):
-        row = {"predictor": str(predictor)}
+        row = {"predictor": str(predictor), **dict.fromkeys(map(str, table["layout"]), "\u2013")}
         for layout, accuracy, difference in zip(part["layout"], part["accuracy"], part["difference"], strict=True):
             beside = "" if difference != difference else f" ({round(difference, 3) + 0.0:+.3f})".replace("-", "\u2212")
             row[str(layout)] = f"{accuracy:.3f}{beside}"

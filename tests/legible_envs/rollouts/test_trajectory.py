@@ -210,6 +210,25 @@ def test_trajectories_are_immutable_values() -> None:
         ({"states": [("a", "b")]}, "dtype"),
         ({"states": [(0.0, 1.0), (0.0, np.nan)]}, "state 1, coordinate 1 is nan"),
         ({"states": [(0.0, np.inf)]}, "finite"),
+        ({"states": [(0.0, 1e200), (1.0, 1.0)]}, r"state 0, coordinate 1 is 1e\+200; states must be .*metres"),
+        ({"states": [(0, 2 * 10**9), (1, 1)]}, "state 0, coordinate 1 is 2000000000; states must be cells"),
+        ({"states": np.array([(0, 2**64 - 1), (1, 1)], dtype=np.uint64)}, "states must be cells"),
+        ({"states": np.array([(-(2**63), 0), (1, 1)])}, "states must be cells"),
+        ({"states": np.array([(0.0, np.longdouble("1e400")), (0.0, 0.0)])}, "state 0, coordinate 1"),
+        ({"states": np.ma.masked_array([(0.0, 1.0), (0.0, 1.0)], mask=[(0, 1), (0, 0)])}, "1 entries are missing"),
+        ({"states": [(True, False), (True, True)]}, "dtype bool"),
+        ({"states": [(1j, 0), (0, 0)]}, "dtype complex"),
+        ({"times": ["0", "1_0"]}, "times must be numbers"),
+        ({"times": [False, True]}, "times must be numbers"),
+        ({"times": [1.7e18, 1.8e18]}, r"times must be seconds up to 1e\+12, got 1\.8e\+18"),
+        ({"times": np.ma.masked_array([0.0, 1.0], mask=[0, 1])}, "missing"),
+        ({"goal_positions": (("0", "1"), ("1", "1"))}, "goal positions must be numbers"),
+        ({"goal_positions": ((0.0, 1e10), (1.0, 1.0))}, "metres or pixels"),
+        ({"participant": 3}, "`participant` must be a text, got 3"),
+        ({"condition": None}, "`condition` must be a text"),
+        ({"start": 1.0}, "`start` must be a text"),
+        ({"layout_name": b"a"}, "`layout_name` must be a text"),
+        ({"complete": 1}, "`complete` must be True or False"),
         ({"times": [0.0]}, "shape"),
         ({"times": [1.0, 0.0]}, "never decrease"),
         ({"times": [0.0, np.nan]}, "finite"),
@@ -223,6 +242,27 @@ def test_trajectories_are_immutable_values() -> None:
 def test_bad_trajectories_are_refused(change: dict[str, object], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         Trajectory(**{"states": [(1, 1), (1, 2)], "goal": "a", "candidates": ("a", "b"), **change})  # type: ignore[arg-type]
+
+
+@settings(max_examples=60, deadline=None)
+@given(walks(grid=True), st.data())
+def test_cells_given_several_times_in_a_row_are_kept_once(walk: Trajectory, data: st.DataObject) -> None:
+    assert (np.abs(np.diff(walk.states, axis=0)).sum(axis=1) > 0).all()
+    counts = np.array(data.draw(st.lists(st.integers(1, 3), min_size=walk.num_states, max_size=walk.num_states)), int)
+    states, times = np.repeat(walk.states, counts, axis=0), np.repeat(walk.times, counts)
+    idle = Trajectory(states.reshape(-1, 2), times, candidates=("a",))
+    assert idle.states.tolist() == walk.states.tolist()
+    assert idle.times.tolist() == walk.times.tolist()
+    assert not idle.states.flags.writeable
+    assert not idle.times.flags.writeable
+    counted = Trajectory(states.reshape(-1, 2), candidates=("a",)).times  # of arrival, in ticks
+    assert counted.tolist() == (np.cumsum(counts) - counts).tolist()
+
+
+def test_pauses_between_positions_stay() -> None:
+    walk = reach([(0.0, 0.0), (0.0, 0.0), (1.0, 0.0)], times=[0.0, 1.0, 2.0])
+    assert walk.num_states == 3
+    assert walk.times.tolist() == [0.0, 1.0, 2.0]
 
 
 # -- prefixes ---------------------------------------------------------------------------------------------------------
@@ -275,9 +315,13 @@ def test_prefixes_are_beginnings_that_grow(walk: Trajectory, cut: str) -> None:
 
 def test_bad_prefixes_are_refused() -> None:
     walk = reach([(0, 0), (0, 1)])
-    for fraction in (-0.1, 1.1, float("nan"), 0.0):
+    for fraction in (-0.1, 1.1, float("nan"), 0.0, "0.5", True, None):
         with pytest.raises(ValueError, match="fraction"):
-            walk.prefix(fraction)
+            walk.prefix(fraction)  # type: ignore[arg-type]
+    for count in (2.0, 1.5, True, -1, "1"):
+        with pytest.raises(ValueError, match="count"):
+            walk.first(count)  # type: ignore[arg-type]
+    assert walk.first(np.int8(1)).num_states == 1  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="unknown cut"):
         walk.prefix(0.5, "half")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="count"):

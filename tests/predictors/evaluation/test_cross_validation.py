@@ -146,10 +146,6 @@ def test_conditions_are_learned_apart_and_then_compared() -> None:
     ("walks", "options", "message"),
     [
         ([], {}, "no trajectories"),
-        (people(3), {}, "4 folds need at least 4 trajectories"),
-        (people(10), {}, r"fewer examples than the 4 folds: {'dish': 3, 'tomato': 3}"),
-        ([walk for walk in people() if walk.goal == "dish"], {}, "all 16 trajectories go to 'dish'"),
-        (people(participants=3), {"groups": "participant"}, "at least 4 participants, got 3"),
         (people(participant=""), {"groups": "participant"}, "names no participant"),
         (people(), {"cv": 1}, "cv"),
         (people(), {"repeats": 0}, "repeats"),
@@ -158,10 +154,9 @@ def test_conditions_are_learned_apart_and_then_compared() -> None:
         (people(), {"groups": "layout"}, "groups"),
         (people(), {"by": "start"}, "by"),
         (people(), {"rare": "drop"}, "rare"),
-        ([*people(), people()[0].first(2)], {}, "trajectory 48 is a prefix"),
-        ([*people(), replace(people()[0], goal=None)], {}, "trajectory 48 has no known goal"),
+        ([*people(), people()[0].first(2)], {}, "trajectory 48 .*: it is a prefix"),
+        ([*people(), replace(people()[0], goal=None)], {}, "trajectory 48 .*: it has no known goal"),
         ([*people(), replace(people()[0], candidate_set="game")], {}, "candidate sets"),
-        ([*people(condition="a"), *people(7, condition="b")], {"by": "condition"}, "condition 'b': goals with fewer"),
     ],
 )
 def test_bad_input_is_refused_in_words(walks: list[Trajectory], options: dict[str, Any], message: str) -> None:
@@ -173,7 +168,7 @@ def test_rare_goals_are_judged_if_asked_to() -> None:
     lonely = [replace(w, candidates=(*GOALS, "pot")) for w in people()]
     pot = Trajectory(np.array([(3, 2), (3, 3), (4, 3)]), goal="pot", candidates=(*GOALS, "pot"), layout=KITCHEN)
     with pytest.raises(ValueError, match=r"{'pot': 1}"):
-        evaluate("bayesian", [*lonely, pot])
+        evaluate("grid-ngram", [*lonely, pot])
     found = evaluate("bayesian", [*lonely, pot], rare="keep", fractions=(0.5,))
     assert (found.table["trajectory"] == 48).sum() == 3
 
@@ -182,7 +177,7 @@ def test_folds_that_teach_nothing_are_refused() -> None:
     # Grouped, the one person who walks to the dish is either judged or learned from.
     walks = [replace(w, participant="a" if w.goal == "dish" else "b") for w in people() if w.goal != "tomato"]
     with pytest.raises(ValueError, match=r"leaves only goal '(onion|dish)' to learn from"):
-        evaluate("bayesian", walks, cv=2, groups="participant")
+        evaluate("grid-ngram", walks, cv=2, groups="participant")
     odd = [w for w in people() if w.goal != "dish"]
     odd = [replace(w, candidates=GOALS if w.participant == "p0" else GOALS[:2]) for w in odd]
     with pytest.raises(ValueError, match=r"goals \['dish'\] are candidates only in the held-out part"):
@@ -387,7 +382,7 @@ def test_bad_sizes_are_refused(options: dict[str, Any], message: str) -> None:
 def test_small_training_sets_must_have_heard_of_all_goals() -> None:
     walks = [replace(w, candidates=(w.goal or "", "pot")) for w in people()]
     with pytest.raises(ValueError, match="never mention goals"):
-        learning_curve("bayesian", walks, sizes=(1,))
+        learning_curve("grid-ngram", walks, sizes=(1,))
 
 
 def test_the_examples_of_the_contract_can_be_evaluated() -> None:
