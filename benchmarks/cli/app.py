@@ -98,6 +98,9 @@ _layout = click.argument("layout", metavar="LAYOUT")
 _pots = click.option(
     "--pots", type=click.IntRange(min=1), help="Kitchens: soups in progress at once. [default: no limit]"
 )
+_player = click.option(
+    "--player", type=click.IntRange(min=1), help="Kitchens: whose score, by the number of the start. [default: 1]"
+)
 _workspace = click.option(
     "--workspace", metavar="NAME", help="Workspace of the layout. [default: the one that recognises it]"
 )
@@ -231,6 +234,7 @@ def workspaces() -> None:
 @_workspace
 @click.option("--prefix", type=_Prefix(), help="Which prefixes count. [default: mean, or the run's own]")
 @_pots
+@_player
 @_task
 @click.option("--trajectories", type=click.Path(exists=True, dir_okay=False, path_type=Path),
               help="Trajectories (.npz, .csv, or recorded play): also predict their goals.")  # fmt: skip
@@ -252,6 +256,7 @@ def score(
     workspace: str | None,
     prefix: Any,
     pots: int | None,
+    player: int | None,
     task: str | None,
     trajectories: Path | None,
     predictors: tuple[str, ...],
@@ -277,7 +282,7 @@ def score(
         raise click.UsageError("--predictor needs --trajectories to evaluate it on")
     if given and not predictors:
         raise click.UsageError(f"--{given[0].replace('_', '-')} is about --predictor, which is not given")
-    design = load_design(layout, workspace=workspace, prefix=prefix, pots=pots, task=task)
+    design = load_design(layout, workspace=workspace, prefix=prefix, pots=pots, task=task, player=player)
     for line in score_lines(design):
         click.echo(line)
     if trajectories is None:
@@ -301,9 +306,18 @@ def score(
 @_workspace
 @click.option("--prefix", type=_Prefix(), help="Which prefixes count. [default: mean, or the run's own]")
 @_pots
+@_player
 @_task
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="Where to write the picture (.png).")
-def show(layout: str, workspace: str | None, prefix: Any, pots: int | None, task: str | None, out: Path | None) -> None:
+def show(
+    layout: str,
+    workspace: str | None,
+    prefix: Any,
+    pots: int | None,
+    player: int | None,
+    task: str | None,
+    out: Path | None,
+) -> None:
     """Draw a layout and explain its score.
 
     Which reaches win and lose it, and where goals are confused. For the search of a table draws its panels: the
@@ -313,7 +327,8 @@ def show(layout: str, workspace: str | None, prefix: Any, pots: int | None, task
     from benchmarks.console import say
     from benchmarks.presenters.registry import load_design
 
-    show_design(say(), load_design(layout, workspace=workspace, prefix=prefix, pots=pots, task=task), out)
+    design = load_design(layout, workspace=workspace, prefix=prefix, pots=pots, task=task, player=player)
+    show_design(say(), design, out)
 
 
 @main.command()

@@ -16,10 +16,11 @@ from legible_envs.overcooked.grid_kernels import neighbour
 from legible_envs.overcooked.humans.fitting import goal_field
 from legible_envs.overcooked.humans.kernels import GoalField, sample_times, sample_walk
 from legible_envs.overcooked.layout import OvercookedLayout
+from legible_envs.overcooked.reach import Reach, reach_from
 from legible_envs.rollouts.trajectory import Trajectory
 from legible_envs.support.validation import real
 
-__all__ = ["Walker", "draw_one", "draw_preferences", "in_reach"]
+__all__ = ["Walker", "draw_one", "draw_preferences", "nearest_first"]
 
 Floats = npt.NDArray[np.float64]
 
@@ -113,7 +114,8 @@ class Walker(ABC):
             goals: The goal, or goals of which one is drawn for each trajectory.
             n: How many trajectories.
             rng: Source of randomness.
-            candidates: Goals that an observer takes for possible; ``goals`` if None.
+            candidates: Goals that an observer takes for possible, ``goals`` if None; those that cannot be reached from
+                where a trajectory begins are left out of it.
             **labels: Further attributes of :class:`~legible_envs.rollouts.Trajectory`, such as ``participant``.
 
         Raises:
@@ -127,13 +129,14 @@ class Walker(ABC):
             goal = names[int(rng.integers(len(names)))]
             cell = self._start_cell(layout, start, goal, rng)
             states, ticks = self.leg(layout, cell, start, goal, rng)
+            out_of_reach = reach_from(layout, cell).out_of_reach
             found.append(
                 Trajectory(
                     states=states,
                     times=self.seconds(ticks),
                     start=start,
                     goal=goal,
-                    candidates=tuple(candidates or names),
+                    candidates=tuple(name for name in candidates or names if name not in out_of_reach),
                     layout=layout,
                     **labels,
                 )
@@ -170,7 +173,8 @@ class Walker(ABC):
             raise LayoutError(f"row {start[0]}, column {start[1]} is no floor cell", rule="start", cell=cells[0])
         field = self._field(layout, goal)
         near = [cell for cell in cells if field.cost_to_go[cell[0] * field.width + cell[1]] < np.inf]
-        return draw_one(near, f"no path to {goal!r} from {start!r}", rng)
+        where = repr(start) if isinstance(start, str) else f"row {start[0]}, column {start[1]}"
+        return draw_one(near, f"no path to {goal!r} from {where}", rng)
 
     def _make_field(self, layout: OvercookedLayout, goal: str) -> GoalField:
         return goal_field(layout, layout.stations[goal], self.costs(layout.shape))
@@ -180,7 +184,8 @@ class Walker(ABC):
         path = np.empty(LONGEST, dtype=np.int64)
         length = sample_walk(self.kind, self.params, start, field, rng, path)
         if length == 0:
-            raise RuntimeError(f"{self!r} did not find the goal within {LONGEST:,} steps")
+            row, col = divmod(field.station, field.width)
+            raise RuntimeError(f"{self} did not find the goal at row {row}, column {col} within {LONGEST:,} steps")
         return path[:length].copy()
 
     def __reduce__(self) -> tuple[object, ...]:
@@ -207,18 +212,16 @@ def _shortest_field(layout: OvercookedLayout, name: str) -> GoalField:
     return goal_field(layout, layout.stations[name])
 
 
-def in_reach(layout: OvercookedLayout, cell: Cell, kind: str) -> list[str]:
-    """Stations of one type that a person can reach, the nearest first."""
-    at = cell[0] * layout.shape[1] + cell[1]
-    steps = {name: float(_shortest_field(layout, name).cost_to_go[at]) for name in layout.named(kind)}
-    found = sorted((name for name in steps if steps[name] < np.inf), key=lambda name: steps[name])
-    if not found:
-        raise LayoutError(
-            f"no {kind} station can be reached from row {cell[0]}, column {cell[1]}; the task needs one",
-            rule="reachable",
-            cell=cell,
-        )
-    return found
+def nearest_first(reach: Reach, cell: Cell, place: str) -> list[str]:
+    """The stations in reach that a task means by a place, those nearest to a floor cell first.
+
+    Args:
+        reach: What the person can get to.
+        cell: A cell where the person can stand.
+        place: A station's name, or a type.
+    """
+    at = cell[0] * reach.layout.shape[1] + cell[1]
+    return sorted(reach.named(place), key=lambda name: float(_shortest_field(reach.layout, name).cost_to_go[at]))
 
 
 def draw_preferences(shape: tuple[int, int], rng: np.random.Generator, preference: float) -> Floats | None:
