@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
 
 from legible_envs.overcooked.layout import FLOOR, OvercookedLayout
-from legible_envs.overcooked.reach import reach_from
 from legible_envs.rollouts.trajectory import Trajectory
 from predictors.base import CandidatePredictor, GoalStream, check_trajectories
+from predictors.grid.candidates import within_reach
 
-__all__ = ["GridPredictor", "check_complete", "check_trajectory", "goal_posterior", "remaining_steps", "within_reach"]
+__all__ = ["GridPredictor", "check_complete", "check_trajectory", "goal_posterior", "remaining_steps"]
 
 GoalCosts = Callable[[OvercookedLayout, tuple[str, ...]], npt.NDArray[np.float64]]
 
@@ -150,7 +149,7 @@ class GridPredictor(CandidatePredictor):
     """A predictor on grids, one trajectory at a time; subclasses define ``candidate_probabilities``.
 
     Candidates that the person cannot reach are no goals: they get probability 0, and the others the probabilities that
-    they have without them (:func:`within_reach`).
+    they have without them (:func:`~predictors.grid.candidates.within_reach`).
     """
 
     def predict_proba(self, X: Sequence[Trajectory]) -> npt.NDArray[np.float64]:
@@ -167,37 +166,3 @@ class GridPredictor(CandidatePredictor):
     def stream(self, context: Trajectory) -> GridStream:
         """Predict one person's goal while they move; see :meth:`GoalPredictor.stream`."""
         return GridStream(self, context)
-
-
-def within_reach(trajectory: Trajectory) -> Trajectory:
-    """The same trajectory without the candidates that cannot be reached from its first cell.
-
-    Two players of a divided kitchen share its layout, and each has goals of their own
-    (:mod:`legible_envs.overcooked.reach`). A trajectory of which nothing is observed, that fits no kitchen, or none of
-    whose candidates is in reach is returned as it is.
-    """
-    layout = trajectory.layout
-    if not isinstance(layout, OvercookedLayout) or not trajectory.num_states or not trajectory.is_grid:
-        return trajectory
-    first = tuple(trajectory.states[0].tolist())
-    out_of_reach = _out_of_reach(layout, trajectory.candidates, first)
-    if not out_of_reach:
-        return trajectory
-    kept = [number for number, name in enumerate(trajectory.candidates) if name not in out_of_reach]
-    places = trajectory.goal_positions
-    goal = None if trajectory.goal in out_of_reach else trajectory.goal
-    return replace(
-        trajectory,
-        goal=goal,
-        candidates=tuple(trajectory.candidates[number] for number in kept),
-        goal_positions=None if places is None else tuple(places[number] for number in kept),
-    )
-
-
-@lru_cache(maxsize=4096)
-def _out_of_reach(layout: OvercookedLayout, candidates: tuple[str, ...], cell: tuple[int, ...]) -> frozenset[str]:
-    """Which candidates are stations out of reach from a cell; none where the cell is no floor, or if all are."""
-    if cell not in _floor_of(layout):
-        return frozenset()
-    found = frozenset(candidates).intersection(reach_from(layout, cell).out_of_reach)
-    return found if len(found) < len(candidates) else frozenset()

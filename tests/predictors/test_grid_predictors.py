@@ -22,6 +22,7 @@ from predictors import (
     GridNeighbours,
     GridNGram,
     MaxEntIRL,
+    RecurrentPredictor,
     ShortestDistance,
 )
 from predictors.grid.graphs import walk_graph
@@ -329,11 +330,18 @@ def halves() -> list[Trajectory]:
     return found
 
 
-@pytest.mark.parametrize("predictor", [*BAYESIAN[:5], *LEARNERS, ShortestDistance(), ShortestDistance("geodesic")])
+NEURAL = RecurrentPredictor(4, members=1, max_epochs=1, validation_fraction=0.0)
+
+
+@pytest.mark.parametrize(
+    "predictor", [*BAYESIAN[:5], *LEARNERS, ShortestDistance(), ShortestDistance("geodesic"), NEURAL], ids=repr
+)
 def test_candidates_out_of_reach_are_no_goals(predictor: GoalPredictor) -> None:
     walks = halves()
     everything = tuple(sorted({name for each in walks for name in each.candidates}))
     fitted = clone(predictor).fit(walks)
+    of_all = clone(predictor).fit([replace(each, candidates=everything) for each in walks])
+    np.testing.assert_array_equal(of_all.predict_proba(walks), fitted.predict_proba(walks))
     for each in walks:
         for count in range(1, each.num_states + 1):
             alone, among_all = each.first(count), replace(each.first(count), candidates=everything)
@@ -349,7 +357,8 @@ def test_candidates_out_of_reach_are_no_goals(predictor: GoalPredictor) -> None:
         belief = stream.update(cell)
         assert belief.keys() == set(everything)
         own = fitted.predict_proba([walks[0].first(count)])[0]
-        assert [belief[name] for name in everything] == [own[fitted.classes_.tolist().index(n)] for n in everything]
+        of_own = [own[fitted.classes_.tolist().index(name)] for name in everything]
+        assert [belief[name] for name in everything] == pytest.approx(of_own, abs=1e-12)
 
 
 def test_where_no_candidate_is_in_reach_they_are_named() -> None:
