@@ -52,6 +52,12 @@ class Reach:
     out_of_reach: tuple[str, ...]
 
     @cached_property
+    def region(self) -> Cell | None:
+        """First floor cell in reach, in reading order: the same for all who can get to each other; None without any."""
+        cells = np.argwhere(self.floor)
+        return (int(cells[0, 0]), int(cells[0, 1])) if len(cells) else None
+
+    @cached_property
     def kitchen(self) -> OvercookedLayout:
         """The same kitchen with a counter in place of each station out of reach."""
         cells = [self.layout.stations[name] for name in self.out_of_reach]

@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
+from legible_envs.overcooked.grid import Cell
 from legible_envs.overcooked.layout import FLOOR, OvercookedLayout
 from legible_envs.rollouts.trajectory import Trajectory
 from predictors.base import CandidatePredictor, GoalStream, check_trajectories
@@ -15,7 +16,7 @@ from predictors.grid.candidates import within_reach
 
 __all__ = ["GridPredictor", "check_complete", "check_trajectory", "goal_posterior", "remaining_steps"]
 
-GoalCosts = Callable[[OvercookedLayout, tuple[str, ...]], npt.NDArray[np.float64]]
+GoalCosts = Callable[[OvercookedLayout, tuple[str, ...], Cell], npt.NDArray[np.float64]]
 
 
 @lru_cache(maxsize=256)
@@ -112,7 +113,7 @@ def goal_posterior(
     Args:
         trajectory: The observed prefix.
         prior: ``(K,)`` probabilities of its candidates.
-        goal_costs: Optimal costs in nats, ``(H, W, K)`` for a layout and names of goals.
+        goal_costs: Optimal costs in nats, ``(H, W, K)`` for a layout, names of goals, and a cell where the person is.
 
     Returns:
         ``(K,)`` probabilities of its candidates; the prior if nothing was observed.
@@ -123,8 +124,8 @@ def goal_posterior(
     layout = check_trajectory(trajectory)
     if not trajectory.num_states:
         return prior
-    costs = goal_costs(layout, trajectory.candidates)
     (first_row, first_col), (row, col) = trajectory.states[0].tolist(), trajectory.states[-1].tolist()
+    costs = goal_costs(layout, trajectory.candidates, (first_row, first_col))
     optimal = costs[first_row, first_col]
     if np.isinf(optimal).any():
         goal = trajectory.candidates[int(np.isinf(optimal).argmax())]

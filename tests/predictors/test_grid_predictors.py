@@ -361,6 +361,42 @@ def test_candidates_out_of_reach_are_no_goals(predictor: GoalPredictor) -> None:
         assert [belief[name] for name in everything] == pytest.approx(of_own, abs=1e-12)
 
 
+def test_costs_are_those_of_the_floor_in_the_persons_reach() -> None:
+    """A corridor and an open room share the dishes; in the room the sum over paths diverges earlier."""
+    rows = [
+        "XOXXXXXXXXOX",
+        "X XX       X",
+        "X XX       X",
+        "T 1D       X",
+        "X XX       X",
+        "XXXX   2   X",
+        "XXXXXXXXXPXX",
+    ]
+    whole, alone = (OvercookedLayout.from_rows(one) for one in (rows, [row[:4] + "X" * 8 for row in rows]))
+    ways = [
+        [(3, 1), (2, 1), (1, 1), (0, 1)],
+        [(2, 1), (1, 1), (2, 1), (3, 1), (3, 0)],
+        [(2, 1), (3, 1), (3, 2), (3, 3)],
+        [(1, 1), (2, 1), (3, 1), (4, 1), (3, 1), (3, 2), (3, 3)],
+    ]
+    of_whole, of_alone = (
+        [Trajectory(way, goal=one.station_at(way[-1]), candidates=names, layout=one) for way in ways]
+        for one, names in ((whole, ("dish", "onion@(0,1)", "tomato")), (alone, ("dish", "onion", "tomato")))
+    )
+    others = (BayesianGoalPredictor(0.85, costs="soft"), MaxEntIRL(features=np.ones((84, 1))))
+    for predictor in (*BAYESIAN[:5], *LEARNERS, *others):
+        one, other = clone(predictor).fit(of_whole), clone(predictor).fit(of_alone)
+        for seen, same in zip(of_whole, of_alone, strict=True):
+            for count in range(seen.num_states + 1):
+                found, wanted = (p.predict_proba([w.first(count)])[0] for p, w in ((one, seen), (other, same)))
+                np.testing.assert_allclose(found, wanted, atol=1e-9, err_msg=repr(predictor))
+        if isinstance(one, MaxEntIRL) and isinstance(other, MaxEntIRL):
+            assert one.uniform_cost_ == pytest.approx(other.uniform_cost_)
+            np.testing.assert_allclose(one.log_likelihoods(of_whole), other.log_likelihoods(of_alone))
+    with pytest.raises(ValueError, match="diverges"):
+        BayesianGoalPredictor(0.85, costs="soft").fit(of_whole).goal_costs(whole, of_whole[0].candidates)
+
+
 def test_where_no_candidate_is_in_reach_they_are_named() -> None:
     split = OvercookedLayout.from_ascii("XOXTX\nX X D\nX X X\nXXPXX")
     ways = [walk([(1, 1), (0, 1)], layout=split), walk([(2, 1), (1, 1), (0, 1)], layout=split)]
