@@ -165,6 +165,8 @@ def trajectories_from_played(
 def recipes_for(layout: OvercookedLayout, player: int = 1) -> tuple[Recipe, ...]:
     """Soups that a player can cook: the paper's whose ingredients are in reach, else three of each such ingredient.
 
+    Where no ingredient is in reach, soups are of all in the kitchen, so that errors name what the player lacks.
+
     Args:
         layout: The kitchen.
         player: Number of the player, from 1.
@@ -172,10 +174,14 @@ def recipes_for(layout: OvercookedLayout, player: int = 1) -> tuple[Recipe, ...]
     Raises:
         LayoutError: The kitchen has no start of this player.
     """
-    reach = reach_of(layout, player)
-    there = {kind for kind in INGREDIENTS if reach.named(kind)}
+    in_reach, drawn = (set(map(_kind, names)) for names in (reach_of(layout, player).stations, layout.stations))
+    there = in_reach.intersection(INGREDIENTS) or drawn
     known = tuple(soup for soup in PAPER_SOUPS if there >= set(soup))
     return known or tuple((kind,) * 3 for kind in INGREDIENTS if kind in there) or PAPER_SOUPS
+
+
+def _kind(name: str) -> str:
+    return name.partition("@")[0]
 
 
 def play(

@@ -11,18 +11,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from legible_envs.errors import LayoutError
+from legible_envs.errors import LayoutError, TaskError
 from legible_envs.overcooked.grid import Cell
 from legible_envs.overcooked.layout import COUNTER, OvercookedLayout
-from legible_envs.support.validation import integer
-
-if TYPE_CHECKING:
-    from legible_envs.tasks import TaskGraph
+from legible_envs.support.validation import integer, shown
+from legible_envs.tasks import TaskGraph
 
 __all__ = ["Reach", "reach_from", "reach_of"]
 
@@ -83,7 +80,10 @@ class Reach:
         Raises:
             LayoutError: The kitchen lacks a station, or none of its type is in reach; the message names types and
                 places.
+            TaskError: It is no task.
         """
+        if not isinstance(task, TaskGraph):
+            raise TaskError(f"`task` must be a TaskGraph, got {shown(task)}")
         absent = [kind for kind in task.places if not _meant(self.layout, kind)]
         if absent:
             needed = _listed([f"{'an' if kind[0] in 'aeiou' else 'a'} {kind} station" for kind in absent])
@@ -125,7 +125,7 @@ def reach_of(layout: OvercookedLayout, player: int = 1) -> Reach:
         player: Number of the player, from 1, as drawn.
 
     Raises:
-        LayoutError: The kitchen has no start of this player.
+        LayoutError: It is no kitchen, or has no start of this player.
 
     Example:
         >>> kitchen = OvercookedLayout.from_rows(["XOXXXOX", "X1 P 2X", "XXDXSXX"])
@@ -134,6 +134,8 @@ def reach_of(layout: OvercookedLayout, player: int = 1) -> Reach:
         >>> reach_of(kitchen, player=2).out_of_reach
         ('onion@(0,1)', 'dish')
     """
+    if not isinstance(layout, OvercookedLayout):
+        raise LayoutError(f"`layout` must be an OvercookedLayout, got {shown(layout)}", rule="type")
     count = len(layout.starts)
     unit = f"(the kitchen has {count} {'start' if count == 1 else 'starts'})"
     player = integer("player", player, 1, count, unit=unit, error=partial(LayoutError, rule="start"))

@@ -18,7 +18,7 @@ from legible_envs.overcooked.humans.kernels import GoalField, sample_times, samp
 from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.overcooked.reach import Reach, reach_from
 from legible_envs.rollouts.trajectory import Trajectory
-from legible_envs.support.validation import real
+from legible_envs.support.validation import entries, real, shown
 
 __all__ = ["Walker", "draw_one", "draw_preferences", "nearest_first"]
 
@@ -56,7 +56,10 @@ class Walker(ABC):
         self.tick = real("tick", tick, 0)
         if self.idle + self.turn >= 1:
             raise ValueError(f"idle + turn must be less than 1, got {idle!r} + {turn!r}: the person would never move")
-        self.preferences = None if preferences is None else np.array(preferences, dtype=np.float64)
+        try:
+            self.preferences = None if preferences is None else np.array(preferences, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise ValueError(f"`preferences` must be an (H, W) array of costs, got {shown(preferences)}") from error
         if self.preferences is not None and not ((self.preferences > 0) & (self.preferences < np.inf)).all():
             raise ValueError("preferences are costs of stepping on cells: they must be finite and greater than 0")
         self._fields = lru_cache(maxsize=256)(self._make_field)
@@ -88,7 +91,7 @@ class Walker(ABC):
             rng: Source of randomness.
 
         Raises:
-            LayoutError: No such station, a start that is no floor cell, or no path.
+            LayoutError: No such station, a start that is neither a station nor a floor cell, or no path.
             RuntimeError: The person did not find the goal in 100,000 steps.
         """
         cell = self._start_cell(layout, start, goal, rng)
@@ -122,7 +125,9 @@ class Walker(ABC):
             LayoutError: No such station, or no path from the start to a goal.
             RuntimeError: The person did not find the goal in 100,000 steps.
         """
-        names = (goals,) if isinstance(goals, str) else tuple(goals)
+        names = (goals,) if isinstance(goals, str) else tuple(entries(goals))
+        if not names:
+            raise LayoutError(f"`goals` must name at least one station, got {shown(goals)}", rule="station")
         labels = {"condition": "simulated", **labels}
         found = []
         for _ in range(n):
@@ -168,6 +173,10 @@ class Walker(ABC):
 
     def _start_cell(self, layout: OvercookedLayout, start: str | Cell, goal: str, rng: np.random.Generator) -> Cell:
         """The cell of a start, from which the goal can be reached; one of several at random."""
+        if not isinstance(start, str) and len(entries(start)) != 2:
+            raise LayoutError(
+                f"`start` must be a station's name or a cell (row, column), got {shown(start)}", rule="start"
+            )
         cells = layout.access(start) if isinstance(start, str) else ((int(start[0]), int(start[1])),)
         if not isinstance(start, str) and not layout.is_floor(cells[0]):
             raise LayoutError(f"row {start[0]}, column {start[1]} is no floor cell", rule="start", cell=cells[0])

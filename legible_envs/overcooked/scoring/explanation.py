@@ -32,6 +32,7 @@ from legible_envs.overcooked.scoring.boltzmann import (
     boltzmann_legibility,
     boltzmann_trajectories,
 )
+from legible_envs.support.validation import shown
 from legible_envs.tasks import TaskGraph
 
 __all__ = ["ambiguity", "explain_layout", "grid_graph", "layout_distance", "score_layout"]
@@ -89,10 +90,12 @@ def _stage_goals(
     player: int,
 ) -> Iterator[_StageGoal]:
     """Every stage of the task with each of its goals in a player's reach, scored by the readable definition."""
-    human = human_model(layout, human)
     reach = reach_of(layout, player)
     reach.check_task(task)
-    graph = grid_graph(layout, cell_costs, reach=reach)
+    if not isinstance(observer, ObserverModel):
+        raise ValueError(f"`observer` must be an ObserverModel, got {shown(observer)}")
+    human = human_model(layout, human)
+    graph = grid_graph(layout, _checked_costs(reach, cell_costs, observer.tie_tolerance), reach=reach)
     followed: dict[tuple[str, str], BoltzmannTrajectories] = {}
     for stage in task.stages():
         starts = reach.named(stage.start)
@@ -115,6 +118,34 @@ def _stage_goals(
                     truncated = followed[start, goal].truncated_probability
                     scores = boltzmann_legibility(graph, From(start), goals, followed[start, goal], observer)
                 yield _StageGoal(start, goals, goal, stage.weight / len(starts), scores, truncated)
+
+
+def _checked_costs(
+    reach: Reach, cell_costs: npt.NDArray[np.float64] | None, tie_tolerance: float
+) -> npt.NDArray[np.float64] | None:
+    """``(H, W)`` costs of stepping on cells, those of the floor in reach finite and greater than what counts as a tie.
+
+    Raises:
+        ValueError: No numbers, another shape, or a cost out of range (naming the cell).
+    """
+    if cell_costs is None:
+        return None
+    shape = reach.layout.shape
+    try:
+        costs = np.array(cell_costs, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ValueError(f"`cell_costs` must be an array of numbers of shape {shape}: {error}") from error
+    if costs.shape != shape:
+        raise ValueError(f"`cell_costs` must have the kitchen's shape {shape}, got {costs.shape}")
+    least = max(1e-6, 2 * tie_tolerance)
+    wrong = np.argwhere(reach.floor & ~(np.isfinite(costs) & (costs >= least)))
+    if len(wrong):
+        row, col = wrong[0]
+        raise ValueError(
+            f"`cell_costs` of floor cells must be finite and at least {least:g}; row {row}, column {col} is "
+            f"{costs[row, col]}"
+        )
+    return costs
 
 
 def human_model(layout: OvercookedLayout, human: HumanModel | HumanName) -> HumanModel:
@@ -184,10 +215,11 @@ def score_layout(
 
     Raises:
         LayoutError: A station the task needs is missing or out of the player's reach, or there is no such player.
+        ValueError: Costs of another shape, or not finite and greater than 0 on the floor.
     """
     task = task or soup_task()
-    human = human_model(layout, human)
     reach = reach_of(layout, player)
+    human = human_model(layout, human)
     parts, single, pairs, truncated = [], [], [], []
     for part in _stage_goals(layout, task, observer, human, cell_costs, player):
         value = part.weight * math.fsum(s.probability * s.weight * s.value for s in part.scores)

@@ -7,11 +7,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from legible_envs.errors import TaskError
 from legible_envs.observer import ObserverModel
 from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.overcooked.recipes import soup_task
 from legible_envs.overcooked.scoring import explanation
 from legible_envs.overcooked.scoring.boltzmann import HumanModel, HumanName
+from legible_envs.support.validation import shown
 from legible_envs.tasks import TaskGraph
 
 __all__ = ["OvercookedScorer"]
@@ -40,7 +42,8 @@ class OvercookedScorer:
         cell_costs: The costs, or None.
 
     Raises:
-        ValueError: ``human`` is unknown.
+        TaskError: ``task`` is no task.
+        ValueError: ``human`` is unknown, or ``observer`` is no observer.
 
     Example:
         >>> kitchen = OvercookedLayout([[1, 1, 8, 1, 1], [4, 0, 0, 0, 1], [1, 0, 0, 0, 9], [1, 1, 7, 1, 1]])
@@ -58,8 +61,12 @@ class OvercookedScorer:
         human: HumanModel | HumanName = "shortest",
         cell_costs: npt.NDArray[np.float64] | None = None,
     ) -> None:
-        self.task = task or soup_task()
+        self.task = soup_task() if task is None else task
         self.observer = observer
+        if not isinstance(self.task, TaskGraph):
+            raise TaskError(f"`task` must be None or a TaskGraph, got {shown(task)}")
+        if not isinstance(observer, ObserverModel):
+            raise ValueError(f"`observer` must be an ObserverModel, got {shown(observer)}")
         self.human = human if isinstance(human, HumanModel) else HumanModel(human)
         self.cell_costs = cell_costs
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import re
+from dataclasses import replace
 
 import gymnasium as gym
 import numpy as np
@@ -15,7 +16,8 @@ from legible_envs.legibility import From, goal_legibility
 from legible_envs.observer import ObserverModel
 from legible_envs.overcooked import OvercookedLayout, OvercookedScorer, OvercookedWorkspace, reach_of, soup_task
 from legible_envs.overcooked.human_play import recipes_for
-from legible_envs.overcooked.humans import BoltzmannWalker, simulate_participants
+from legible_envs.overcooked.humans import BoltzmannWalker, fit_rationality, simulate_participants
+from legible_envs.overcooked.humans.planner_fitting import fit_planner
 from legible_envs.overcooked.policies import ScriptedPlayer
 from legible_envs.overcooked.reach import reach_from
 from legible_envs.overcooked.scoring.boltzmann import HumanModel
@@ -303,6 +305,27 @@ def test_a_player_without_a_start_is_refused_in_words(player) -> None:
         assert caught.value.rule == "start"
 
 
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: score_any(HALVES.to_ascii(), ONIONS), "`layout` must be an OvercookedLayout, got 'XXX"),
+        (lambda: OvercookedScorer("soup"), "`task` must be None or a TaskGraph, got 'soup'"),
+        (lambda: explain_layout(HALVES, "soup"), "`task` must be a TaskGraph, got 'soup'"),
+        (lambda: OvercookedScorer(ONIONS, observer=2), "`observer` must be an ObserverModel, got 2"),
+        (lambda: ambiguity(HALVES, ONIONS, observer=None), "`observer` must be an ObserverModel, got None"),
+        (lambda: score_any(HALVES, ONIONS, cell_costs="a"), "`cell_costs` must be an array of numbers of shape (5, 9)"),
+        (lambda: score_any(HALVES, ONIONS, cell_costs=np.ones((9, 5))), "the kitchen's shape (5, 9), got (9, 5)"),
+        (lambda: score_any(HALVES, ONIONS, cell_costs=-np.ones((5, 9))), "at least 1e-06; row 1, column 7 is -1.0"),
+        (lambda: score_any(HALVES, ONIONS, cell_costs=np.full((5, 9), math.nan)), "row 1, column 7 is nan"),
+        (lambda: fit_rationality([3]), "expected trajectories, got 3 at index 0"),
+        (lambda: fit_planner([]), "at least one trajectory, got none"),
+    ],
+)
+def test_other_arguments_are_refused_in_words(call, message: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(message)):
+        call()
+
+
 def test_workspaces_score_the_player_of_a_kitchen() -> None:
     ws = OvercookedWorkspace((6, 6), stations=("onion", "dish", "pot", "serving"), recipes=[("onion", "onion")])
     genome = ws.sample(1, np.random.default_rng(0))[0]
@@ -325,6 +348,7 @@ def test_recipes_are_of_ingredients_in_reach() -> None:
     kitchen = OvercookedLayout.from_rows(["XTXOX", "S1X2S", "XDPDX"])
     assert recipes_for(kitchen) == (("tomato",) * 3,)
     assert recipes_for(kitchen, 2) == (("onion",) * 3,)
+    assert recipes_for(SERVED, 2) == (("onion",) * 3,)  # out of reach, which the score then says
 
 
 # -- participants, recordings and games --------------------------------------------------------------------------------
@@ -394,6 +418,22 @@ def test_each_player_of_a_recorded_game_has_their_own_candidates() -> None:
         HALVES, cells, facing, held, seconds, participants=["a", "b"], valid_goals=lambda *_: list(HALVES.stations)
     )
     assert [set(walk.candidates) for walk in everything] == [set(first.candidates), set(second.candidates)]
+
+
+def test_walkers_are_fitted_to_the_floor_of_their_own_half() -> None:
+    rng, own = np.random.default_rng(3), []
+    task = soup_task([("onion", "onion")])
+    walks = {p: simulate_participants(SHARED, 6, rng, task=task, player=p, participant=str(p)) for p in (1, 2)}
+    for player, mine in walks.items():
+        alone = without(SHARED, player, floor_too=True)
+        for walk in mine:
+            renamed = {name: alone.station_at(SHARED.stations[name]) for name in walk.candidates}
+            goal, names = renamed[walk.goal], tuple(renamed.values())
+            own.append(replace(walk, layout=alone, goal=goal, candidates=names, start=""))
+    both = [*walks[1], *walks[2]]
+    assert fit_rationality(both) == fit_rationality(own)
+    grid = {"depth": (2, 3), "turn_cost": (0.0, 0.5), "recency": (1.0,), "fade": (0.8,)}
+    assert fit_planner(both, grid) == fit_planner(own, grid)
 
 
 def test_the_running_game_has_the_goals_of_its_player() -> None:
