@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import lru_cache
 
-from legible_envs.overcooked.layout import OvercookedLayout
+import numpy as np
+
+from legible_envs.overcooked.layout import FLOOR, OvercookedLayout
 from legible_envs.overcooked.reach import reach_from
 from legible_envs.rollouts.trajectory import Trajectory
 
@@ -20,7 +22,9 @@ def within_reach(trajectory: Trajectory) -> Trajectory:
     whose candidates is in reach is returned as it is.
     """
     layout = trajectory.layout
-    if not isinstance(layout, OvercookedLayout) or not trajectory.num_states or not trajectory.is_grid:
+    if not isinstance(layout, OvercookedLayout) or not _is_divided(layout):
+        return trajectory
+    if not trajectory.num_states or not trajectory.is_grid:
         return trajectory
     first = tuple(trajectory.states[0].tolist())
     out_of_reach = _out_of_reach(layout, trajectory.candidates, first)
@@ -35,6 +39,19 @@ def within_reach(trajectory: Trajectory) -> Trajectory:
         candidates=tuple(trajectory.candidates[number] for number in kept),
         goal_positions=None if places is None else tuple(places[number] for number in kept),
     )
+
+
+@lru_cache(maxsize=256)
+def _is_divided(layout: OvercookedLayout) -> bool:
+    """Whether some station is out of reach from some floor cell; most kitchens are whole, and need no further look."""
+    floor = layout.cells == FLOOR
+    while floor.any():
+        row, col = np.argwhere(floor)[0]
+        reach = reach_from(layout, (row, col))
+        if reach.out_of_reach:
+            return True
+        floor &= ~reach.floor
+    return False
 
 
 @lru_cache(maxsize=4096)
