@@ -23,8 +23,10 @@ __all__ = [
     "From",
     "Graph",
     "PrefixScore",
+    "costs_to_goals",
     "env_legibility",
     "goal_legibility",
+    "in_words",
     "optimal_costs",
     "posterior",
     "prefix_weights",
@@ -154,6 +156,24 @@ def optimal_costs(graph: Graph, goal: Node) -> dict[Node, float]:
     return best
 
 
+def costs_to_goals(graph: Graph, start: Node, goals: Sequence[Node]) -> dict[Node, dict[Node, float]]:
+    """:func:`optimal_costs` to each of the goals, all of which can be reached from the start.
+
+    Raises:
+        ValueError: A goal cannot be reached from the start.
+    """
+    costs = {goal: optimal_costs(graph, goal) for goal in goals}
+    unreachable = [goal for goal in goals if start not in costs[goal]]
+    if unreachable:
+        raise ValueError(f"no path from {in_words(start)} to {', '.join(map(in_words, unreachable))}")
+    return costs
+
+
+def in_words(node: Node) -> str:
+    """A node as messages name it: a place by its name, whether it is left or arrived at."""
+    return repr(node.place if isinstance(node, From) else node)
+
+
 @dataclass(frozen=True, slots=True)
 class PrefixScore:
     """One prefix that an observer may see of trajectories to a goal.
@@ -201,10 +221,7 @@ def goal_legibility(
     Raises:
         ValueError: A goal cannot be reached from the start.
     """
-    costs = {g: optimal_costs(graph, g) for g in goals}
-    unreachable = [g for g in goals if start not in costs[g]]
-    if unreachable:
-        raise ValueError(f"no path from {start!r} to {unreachable}")
+    costs = costs_to_goals(graph, start, goals)
     optimal = {g: costs[g][start] for g in goals}
     onward = {
         node: [

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from legible_envs.errors import TaskError
-from legible_envs.support.validation import integer
+from legible_envs.support.validation import entries, integer, shown
 from legible_envs.task_states import StateSpace, SubtaskClass
 
 if TYPE_CHECKING:
@@ -50,10 +50,7 @@ class Subtask:
     def __post_init__(self) -> None:
         for attribute in ("goals", "after", "then"):
             value = getattr(self, attribute)
-            values = (value,) if isinstance(value, str) else tuple(value)
-            if not all(isinstance(v, str) and v for v in values):
-                raise TaskError(f"subtask {self.name!r}: `{attribute}` must hold non-empty names, got {values!r}")
-            object.__setattr__(self, attribute, values)
+            object.__setattr__(self, attribute, _names(f"subtask {self.name!r}: `{attribute}`", value))
         if not isinstance(self.name, str) or not self.name:
             raise TaskError(f"a subtask needs a non-empty name, got {self.name!r}")
         if not self.goals:
@@ -132,9 +129,16 @@ class TaskGraph:
         groups: Mapping[str, Sequence[str]] | None = None,
         max_open: int | None = None,
     ) -> None:
-        object.__setattr__(self, "subtasks", tuple(subtasks))
+        listed = entries(subtasks)
+        for number, subtask in enumerate(listed, 1):
+            if not isinstance(subtask, Subtask):
+                raise TaskError(f"entry {number} of `subtasks` must be a Subtask, got {shown(subtask)}")
+        if groups is not None and not isinstance(groups, Mapping):
+            raise TaskError(f"`groups` must map group names to lists of subtasks, got {shown(groups)}")
+        grouped = {name: _names(f"group {name!r} of `groups`", members) for name, members in (groups or {}).items()}
+        object.__setattr__(self, "subtasks", tuple(listed))
         object.__setattr__(self, "start", start)
-        object.__setattr__(self, "groups", {name: tuple(members) for name, members in (groups or {}).items()})
+        object.__setattr__(self, "groups", grouped)
         object.__setattr__(self, "max_open", max_open)
         self._check_names()
         self._check_acyclic()
@@ -150,7 +154,7 @@ class TaskGraph:
 
     def _check_names(self) -> None:
         if not self.subtasks:
-            raise TaskError("a task needs at least one subtask")
+            raise TaskError("a task needs at least one subtask; `subtasks` must be a list of Subtask")
         if not isinstance(self.start, str) or not self.start:
             raise TaskError(f"`start` must name a place, got {self.start!r}")
         names = [s.name for s in self.subtasks]
@@ -310,11 +314,11 @@ class TaskGraph:
         if not isinstance(data, Mapping):
             raise TaskError(f"a task must be a mapping with keys `start` and `subtasks`, got {type(data).__name__}")
         _check_keys(data, required={"start", "subtasks"}, optional={"groups", "max_open"}, where="the task")
-        entries = data["subtasks"]
-        if isinstance(entries, str) or not isinstance(entries, Sequence):
-            raise TaskError(f"`subtasks` must be a list, got {type(entries).__name__}")
+        listed = data["subtasks"]
+        if isinstance(listed, str) or not isinstance(listed, Sequence):
+            raise TaskError(f"`subtasks` must be a list, got {type(listed).__name__}")
         subtasks = []
-        for number, entry in enumerate(entries, 1):
+        for number, entry in enumerate(listed, 1):
             if not isinstance(entry, Mapping):
                 raise TaskError(f"subtask number {number} must be a mapping, got {type(entry).__name__}")
             _check_keys(entry, {"name", "goals"}, {"after", "then", "count"}, f"subtask number {number}")
@@ -349,7 +353,7 @@ class TaskGraph:
         try:
             data = yaml.safe_load(text)
         except yaml.YAMLError as error:
-            raise TaskError(f"not valid YAML: {error}") from error
+            raise TaskError(f"not valid YAML: {' '.join(str(error).split())}") from error
         return cls.from_dict(data)
 
     def to_networkx(self) -> nx.DiGraph:
@@ -362,6 +366,15 @@ class TaskGraph:
             graph.add_node(s.name, goals=s.goals, then=s.then, count=s.count, group=group_of.get(s.name))
         graph.add_edges_from((before, s.name) for s in self.subtasks for before in s.after)
         return graph
+
+
+def _names(what: str, value: object) -> tuple[str, ...]:
+    """Names in a list, or a single one."""
+    names = [value] if isinstance(value, str) else entries(value)
+    empty_is_meant = isinstance(value, Iterable) and not isinstance(value, str | bytes | Mapping)
+    if not all(isinstance(name, str) and name for name in names) or not (names or empty_is_meant):
+        raise TaskError(f"{what} must hold non-empty names, got {shown(value)}")
+    return tuple(names)
 
 
 def _check_keys(data: Mapping[str, Any], required: set[str], optional: set[str], where: str) -> None:

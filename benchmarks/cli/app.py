@@ -16,6 +16,7 @@ from benchmarks.cli.options import (
     given_options,
     layout_argument,
     out_folder,
+    player_option,
     pots_option,
     task_option,
     workspace_option,
@@ -181,6 +182,7 @@ def workspaces() -> None:
 @workspace_option
 @click.option("--prefix", type=Prefix(), help="Which prefixes count. [default: mean, or the run's own]")
 @pots_option
+@player_option
 @task_option
 @click.option("--trajectories", type=click.Path(exists=True, dir_okay=False, path_type=Path),
               help="Trajectories (.npz, .csv, or recorded play): also predict their goals.")  # fmt: skip
@@ -202,6 +204,7 @@ def score(
     workspace: str | None,
     prefix: Any,
     pots: int | None,
+    player: int | None,
     task: str | None,
     trajectories: Path | None,
     predictors: tuple[str, ...],
@@ -229,7 +232,7 @@ def score(
         raise click.UsageError("--predictor needs --trajectories to evaluate it on")
     if given and not predictors:
         raise click.UsageError(f"--{given[0].replace('_', '-')} is about --predictor, which is not given")
-    design = load_design(layout, workspace=workspace, prefix=prefix, pots=pots, task=task)
+    design = load_design(layout, workspace=workspace, prefix=prefix, pots=pots, task=task, player=player)
     if predictors and (folder := evaluation_folder(layout, out)) is not None:
         check_folder(folder, "--out")
     for line in score_lines(design):
@@ -255,9 +258,18 @@ def score(
 @workspace_option
 @click.option("--prefix", type=Prefix(), help="Which prefixes count. [default: mean, or the run's own]")
 @pots_option
+@player_option
 @task_option
 @click.option("--out", type=DestinationFile(".png"), help="Where to write the picture (.png).")
-def show(layout: str, workspace: str | None, prefix: Any, pots: int | None, task: str | None, out: Path | None) -> None:
+def show(
+    layout: str,
+    workspace: str | None,
+    prefix: Any,
+    pots: int | None,
+    player: int | None,
+    task: str | None,
+    out: Path | None,
+) -> None:
     """Draw a layout and explain its score.
 
     Which reaches win and lose it, and where goals are confused. For the search of a table draws its panels: the
@@ -267,7 +279,8 @@ def show(layout: str, workspace: str | None, prefix: Any, pots: int | None, task
     from benchmarks.console import say
     from benchmarks.presenters.registry import load_design
 
-    show_design(say(), load_design(layout, workspace=workspace, prefix=prefix, pots=pots, task=task), out)
+    design = load_design(layout, workspace=workspace, prefix=prefix, pots=pots, task=task, player=player)
+    show_design(say(), design, out)
 
 
 @main.command()

@@ -22,6 +22,7 @@ __all__ = [
     "given_options",
     "layout_argument",
     "out_folder",
+    "player_option",
     "pots_option",
     "scheduler_option",
     "settings_from",
@@ -160,6 +161,9 @@ out_folder = click.option("--out", type=DestinationFolder(), help="Folder to wri
 layout_argument = click.argument("layout", metavar="LAYOUT", type=LayoutSource())
 pots_option = click.option(
     "--pots", type=click.IntRange(min=1), help="Kitchens: soups in progress at once. [default: no limit]"
+)
+player_option = click.option(
+    "--player", type=click.IntRange(min=1), help="Kitchens: whose score, by the number of the start. [default: 1]"
 )
 workspace_option = click.option(
     "--workspace", metavar="NAME", help="Workspace of the layout. [default: the one that recognises it]"

@@ -46,25 +46,34 @@ RANDOM_LAYOUTS: Final = 1_000
 
 
 class Kitchen(Design):
-    """A kitchen named on the command line; ``settings`` are ``prefix`` and ``pots``."""
+    """A kitchen named on the command line; ``settings`` are ``prefix``, ``pots`` and ``player``."""
 
     noun: ClassVar[str] = "kitchen"
     picture: ClassVar[str] = "where goals are confused"
 
-    def _summary_outside(self) -> dict[str, Any]:
-        return self._scorer.score_layout(self.layout)
+    @property
+    def player(self) -> int:
+        """Whose score it is, by the number of their start."""
+        return int(self.settings.get("player", 1))
 
-    def _explain_outside(self) -> list[dict[str, Any]]:
-        return self._scorer.explain_layout(self.layout)
+    def summary(self) -> dict[str, Any]:
+        """Score, distance and what belongs beside them, of one player."""
+        if self.genome is not None:
+            return dict(self.workspace.summary(self.layout, player=self.player))
+        return dict(self._scorer.score_layout(self.layout, player=self.player))
+
+    def explain(self) -> list[dict[str, Any]]:
+        """Where the score of one player comes from: a row per stage and goal, the greatest loss first."""
+        return list(self._scorer.explain_layout(self.layout, player=self.player))
 
     def ambiguity(self) -> npt.NDArray[np.float64]:
         """``(H, W)`` how often an observer would predict a wrong goal; NaN on cells that no path crosses."""
-        if self.genome is not None:
-            return np.asarray(self.workspace.ambiguity(self.genome))
-        return self._scorer.ambiguity(self.layout)
+        return np.asarray(self._scorer.ambiguity(self.layout, player=self.player))
 
     @property
     def _scorer(self) -> OvercookedScorer:
+        if self.genome is not None:
+            return self.workspace.scorer
         from legible_envs.observer import ObserverModel
         from legible_envs.overcooked.recipes import soup_task
         from legible_envs.overcooked.scoring.scorer import OvercookedScorer
@@ -79,7 +88,7 @@ class Kitchen(Design):
             return tuple(self.workspace.recipes)
         from legible_envs.overcooked.human_play import recipes_for
 
-        return recipes_for(self.layout)
+        return recipes_for(self.layout, self.player)
 
     def facts(self) -> list[tuple[str, str]]:
         """Score, distance, task, and the rule it breaks."""
@@ -95,6 +104,8 @@ class Kitchen(Design):
             ("candidate set", summary["candidate_set"]),
             ("sequences", f"{summary['num_sequences']:,}"),
             ("layout id", summary["layout_id"]),
+            *([("player", str(self.player))] if "player" in self.settings or summary["out_of_reach"] else []),
+            *([("out of reach", ", ".join(summary["out_of_reach"]))] if summary["out_of_reach"] else []),
             *([("design rules", f"outside: {self.broken_rule}")] if self.broken_rule else []),
         ]
 
@@ -121,7 +132,7 @@ class Kitchen(Design):
         return isinstance(layout, OvercookedLayout) and bool(np.array_equal(layout.cells, self.layout.cells))
 
 
-def load_kitchen(source: str, *, prefix: Any = None, pots: int | None = None) -> Kitchen:
+def load_kitchen(source: str, *, prefix: Any = None, pots: int | None = None, player: int | None = None) -> Kitchen:
     """Read a kitchen; see :func:`benchmarks.presenters.registry.load_design`.
 
     Raises:
@@ -129,7 +140,7 @@ def load_kitchen(source: str, *, prefix: Any = None, pots: int | None = None) ->
         SearchError: The folder of the search lacks something, or a file there is damaged.
         OSError: The file cannot be read.
     """
-    design = load_design(source, prefix=prefix, pots=pots)
+    design = load_design(source, prefix=prefix, pots=pots, player=player)
     if not isinstance(design, Kitchen):
         raise LayoutError(f"{source} is a {design.noun}; expected a kitchen", rule="type")
     return design
@@ -144,13 +155,14 @@ def kitchen_from(text: str, name: str, asked: Mapping[str, Any]) -> Kitchen:
     from legible_envs.workspace import make_workspace
 
     refuse(asked, "task", "kitchen")
+    of_score = {key: value for key, value in asked.items() if key != "player"}
     try:
         is_foreign = text.lstrip().startswith("{") or name.endswith(".layout")
         layout = OvercookedLayout.from_overcooked_ai(text) if is_foreign else OvercookedLayout.from_ascii(text)
     except LayoutError as error:
         raise LayoutError(f"{name}: {error}", rule=error.rule, cell=error.cell) from error
     try:
-        workspace = make_workspace("overcooked", shape=layout.shape, **asked)
+        workspace = make_workspace("overcooked", shape=layout.shape, **of_score)
     except LayoutError as error:
         return Kitchen(layout, None, None, str(error), dict(asked))
     genome, broken_rule = as_genome(workspace, layout)
@@ -214,7 +226,7 @@ class KitchenPresenter(Presenter):
     def design_of_run(self, run: SearchResult, asked: Mapping[str, Any]) -> Design:
         """The best kitchen of a run."""
         refuse(asked, "task", "kitchen")
-        workspace = workspace_of_run(run, asked)
+        workspace = workspace_of_run(run, {key: value for key, value in asked.items() if key != "player"})
         genome = run.require_genome()
         return Kitchen(run.best_layout, workspace, genome, "", dict(asked))
 

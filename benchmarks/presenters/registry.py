@@ -106,7 +106,13 @@ def usable_presenters() -> Iterator[Presenter]:
 
 
 def load_design(
-    source: str, *, workspace: str | None = None, prefix: Any = None, pots: int | None = None, task: str | None = None
+    source: str,
+    *,
+    workspace: str | None = None,
+    prefix: Any = None,
+    pots: int | None = None,
+    task: str | None = None,
+    player: int | None = None,
 ) -> Design:
     """Read what LAYOUT names: the text of a layout, ``-`` (standard input), or the folder of a search.
 
@@ -117,13 +123,15 @@ def load_design(
         pots: Soups in progress at once, in a kitchen; None means the run's own setting, or no limit.
         task: What is built on a table: a name, or the path of a YAML file. None means the run's own, or the one task
             of the package that has the table's objects.
+        player: Whose score it is, in a kitchen, by the number of their start. None means player 1.
 
     Raises:
         LayoutError: The layout is malformed; the message says where.
         SearchError: The run folder lacks something.
         OSError: The file cannot be read.
     """
-    asked = {k: v for k, v in (("prefix", prefix), ("pots", pots), ("task", task)) if v is not None}
+    given = {"prefix": prefix, "pots": pots, "task": task, "player": player}
+    asked = {key: value for key, value in given.items() if value is not None}
     if source != "-" and is_run_folder(source):
         from optimizers import load_run
 

@@ -179,6 +179,7 @@ def table_from(text: str, name: str, asked: Mapping[str, Any]) -> TableDesign:
     from legible_envs.workspace import make_workspace
 
     refuse(asked, "pots", "table")
+    refuse(asked, "player", "table")
     try:
         layout = TabletopLayout.from_json(text + "\n")
     except LayoutError as error:
@@ -310,6 +311,7 @@ class TablePresenter(Presenter):
     def design_of_run(self, run: SearchResult, asked: Mapping[str, Any]) -> Design:
         """The best table of a run."""
         refuse(asked, "pots", "table")
+        refuse(asked, "player", "table")
         refuse(asked, "task", "run, which has its own task")
         workspace: Any = workspace_of_run(run, asked)
         genome = run.require_genome()

@@ -1,5 +1,6 @@
 from .design.workspace import OvercookedWorkspace
 from .layout import OvercookedLayout
+from .reach import Reach, reach_of
 from .recipes import PAPER_SOUPS, soup_task
 from .scoring.scorer import OvercookedScorer
 
@@ -8,5 +9,7 @@ __all__ = [
     "OvercookedLayout",
     "OvercookedScorer",
     "OvercookedWorkspace",
+    "Reach",
+    "reach_of",
     "soup_task",
 ]

@@ -18,6 +18,7 @@ import numpy.typing as npt
 from legible_envs.drawing.window import open_screen, room_for_a_window
 from legible_envs.overcooked.game.vectors import INTERACT, STAY
 from legible_envs.overcooked.layout import INGREDIENTS, OvercookedLayout
+from legible_envs.overcooked.reach import reach_of
 from legible_envs.overcooked.recipes import PAPER_SOUPS, Recipe, check_recipes
 from legible_envs.support.files import write_npz
 from legible_envs.support.validation import real
@@ -165,11 +166,26 @@ def trajectories_from_played(
         env.close()
 
 
-def recipes_for(layout: OvercookedLayout) -> tuple[Recipe, ...]:
-    """Soups that can be cooked in a kitchen: the paper's whose ingredients are there, else three of each ingredient."""
-    there = {kind for kind in INGREDIENTS if any(layout.access(name) for name in layout.named(kind))}
+def recipes_for(layout: OvercookedLayout, player: int = 1) -> tuple[Recipe, ...]:
+    """Soups that a player can cook: the paper's whose ingredients are in reach, else three of each such ingredient.
+
+    Where no ingredient is in reach, soups are of all in the kitchen, so that errors name what the player lacks.
+
+    Args:
+        layout: The kitchen.
+        player: Number of the player, from 1.
+
+    Raises:
+        LayoutError: The kitchen has no start of this player.
+    """
+    in_reach, drawn = (set(map(_kind, names)) for names in (reach_of(layout, player).stations, layout.stations))
+    there = in_reach.intersection(INGREDIENTS) or drawn
     known = tuple(soup for soup in PAPER_SOUPS if there >= set(soup))
     return known or tuple((kind,) * 3 for kind in INGREDIENTS if kind in there) or PAPER_SOUPS
+
+
+def _kind(name: str) -> str:
+    return name.partition("@")[0]
 
 
 def play(

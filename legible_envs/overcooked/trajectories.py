@@ -13,6 +13,7 @@ from legible_envs.overcooked.game.vectors import AT_PLAYERS
 from legible_envs.overcooked.game.view import GameView
 from legible_envs.overcooked.grid import NEIGHBOURS, Cell
 from legible_envs.overcooked.layout import INGREDIENTS, OvercookedLayout
+from legible_envs.overcooked.reach import reach_from
 from legible_envs.rollouts.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -97,12 +98,7 @@ def _without_repeats(cells: npt.NDArray[np.integer], first: int) -> tuple[tuple[
 
 def dispensers_in_reach(layout: OvercookedLayout, cell: Sequence[int]) -> tuple[str, ...]:
     """Ingredient and dish stations within reach of a floor cell, in reading order: candidates ``all``."""
-    away = layout.distances_from([cell])
-    return tuple(
-        name
-        for name in layout.stations
-        if name.partition("@")[0] in _GOALS and any(away[beside] >= 0 for beside in layout.access(name))
-    )
+    return tuple(name for name in reach_from(layout, cell).stations if name.partition("@")[0] in _GOALS)
 
 
 def trajectories(
@@ -121,6 +117,9 @@ def trajectories(
     **labels: Any,
 ) -> list[Trajectory]:
     """The trajectories of all players; arrays as in ``find_walks`` with a player axis after the first.
+
+    The candidates of each trajectory are those in reach of its own person, who stands on its first cell: two players
+    of a divided kitchen have different ones.
 
     Args:
         layout: The kitchen.

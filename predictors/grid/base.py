@@ -10,9 +10,11 @@ from typing import Final, cast
 import numpy as np
 import numpy.typing as npt
 
+from legible_envs.overcooked.grid import Cell
 from legible_envs.overcooked.layout import FLOOR, OvercookedLayout
 from legible_envs.rollouts.trajectory import Cut, Trajectory
 from predictors.base import FRACTIONS, CandidatePredictor, GoalStream, TrajectoryError, check_trajectories
+from predictors.grid.candidates import within_reach
 
 __all__ = [
     "GridPredictor",
@@ -25,7 +27,7 @@ __all__ = [
 ]
 
 _FOUND_RIGHT: Final = "_is_whole_way"
-GoalCosts = Callable[[OvercookedLayout, tuple[str, ...]], npt.NDArray[np.float64]]
+GoalCosts = Callable[[OvercookedLayout, tuple[str, ...], Cell], npt.NDArray[np.float64]]
 
 
 @lru_cache(maxsize=256)
@@ -175,7 +177,7 @@ def goal_posterior(
     Args:
         trajectory: The observed prefix.
         prior: ``(K,)`` probabilities of its candidates.
-        goal_costs: Optimal costs in nats, ``(H, W, K)`` for a layout and names of goals.
+        goal_costs: Optimal costs in nats, ``(H, W, K)`` for a layout, names of goals, and a cell where the person is.
 
     Returns:
         ``(K,)`` probabilities of its candidates; the prior if nothing was observed.
@@ -186,8 +188,8 @@ def goal_posterior(
     layout = check_trajectory(trajectory)
     if not trajectory.num_states:
         return prior
-    costs = goal_costs(layout, trajectory.candidates)
     (first_row, first_col), (row, col) = trajectory.states[0].tolist(), trajectory.states[-1].tolist()
+    costs = goal_costs(layout, trajectory.candidates, (first_row, first_col))
     optimal = costs[first_row, first_col]
     if np.isinf(optimal).any():
         goal = trajectory.candidates[int(np.isinf(optimal).argmax())]
@@ -212,7 +214,22 @@ class GridStream(GoalStream):
 
 
 class GridPredictor(CandidatePredictor):
-    """A predictor on grids, one trajectory at a time; subclasses define ``candidate_probabilities``."""
+    """A predictor on grids, one trajectory at a time; subclasses define ``candidate_probabilities``.
+
+    Candidates that the person cannot reach are no goals: they get probability 0, and the others the probabilities that
+    they have without them (:func:`~predictors.grid.candidates.within_reach`).
+    """
+
+    def predict_proba(self, X: Sequence[Trajectory]) -> npt.NDArray[np.float64]:
+        """See :meth:`GoalPredictor.predict_proba`; goals out of the person's reach have probability 0."""
+        trajectories = check_trajectories(X)
+        columns = [self.candidate_columns(trajectory) for trajectory in trajectories]
+        probabilities = np.zeros((len(trajectories), len(self.classes_)))
+        for row, trajectory in enumerate(trajectories):
+            part = within_reach(trajectory)
+            here = columns[row] if part is trajectory else self.candidate_columns(part)
+            probabilities[row, here] = self.candidate_probabilities(part)
+        return probabilities
 
     def predict_proba_at(
         self, X: Sequence[Trajectory], fractions: Sequence[float] = FRACTIONS, cut: Cut = "steps"

@@ -9,7 +9,9 @@ import numpy as np
 import numpy.typing as npt
 from sklearn.base import clone
 
+from legible_envs.overcooked.grid import Cell
 from legible_envs.overcooked.layout import OvercookedLayout
+from legible_envs.overcooked.reach import reach_from
 from legible_envs.rollouts.trajectory import Trajectory
 from legible_envs.support.validation import choice, real
 from predictors.grid.base import GridPredictor, check_complete, goal_posterior, remaining_steps
@@ -99,7 +101,7 @@ class BayesianGoalPredictor(GridPredictor):
         super().fit(X, y)
         trajectories = list(X)
         self._prior = GoalPrior(self.prior, trajectories, self.classes_)
-        self._tables: dict[tuple[OvercookedLayout, tuple[str, ...]], npt.NDArray[np.float64]] = {}
+        self._tables: dict[tuple[OvercookedLayout, tuple[str, ...], Cell | None], npt.NDArray[np.float64]] = {}
         if self.beta == "fit":
             for number, trajectory in enumerate(trajectories):
                 check_complete(trajectory, number)
@@ -127,21 +129,31 @@ class BayesianGoalPredictor(GridPredictor):
                 f"`cell_costs` must be 'uniform', 'learned', a MaxEntIRL or an (H, W) array, got {self.cell_costs!r}"
             )
 
-    def goal_costs(self, layout: OvercookedLayout, goals: tuple[str, ...]) -> npt.NDArray[np.float64]:
+    def goal_costs(
+        self, layout: OvercookedLayout, goals: tuple[str, ...], cell: Cell | None = None
+    ) -> npt.NDArray[np.float64]:
         """``(H, W, K)`` optimal costs from each cell into each goal, times ``beta``.
+
+        Args:
+            layout: The kitchen.
+            goals: ``K`` names of stations.
+            cell: Where the person is; soft costs are then those of the floor in their reach. None for all floor.
 
         Raises:
             LayoutError: A goal is not a station of this kitchen.
             ValueError: Soft costs where the sum over paths diverges, or cell costs of another shape.
         """
-        table = self._tables.get((layout, goals))
+        region = reach_from(layout, cell).region if self.costs == "soft" and cell is not None else None
+        table = self._tables.get((layout, goals, region))
         if table is None:
             if len(self._tables) >= 256:
                 self._tables.clear()
-            table = self._tables[layout, goals] = self._make_table(layout, goals)
+            table = self._tables[layout, goals, region] = self._make_table(layout, goals, region)
         return table
 
-    def _make_table(self, layout: OvercookedLayout, goals: tuple[str, ...]) -> npt.NDArray[np.float64]:
+    def _make_table(
+        self, layout: OvercookedLayout, goals: tuple[str, ...], region: Cell | None
+    ) -> npt.NDArray[np.float64]:
         uniform = isinstance(self.cell_costs, str) and self.cell_costs == "uniform"
         if self.beta_ == 0:  # without a path a goal stays infinitely far
             return np.where(np.isinf(remaining_steps(layout, goals)), np.inf, 0.0)
@@ -153,11 +165,11 @@ class BayesianGoalPredictor(GridPredictor):
             costs = self.irl_.cost_map(layout) if hasattr(self, "irl_") else np.asarray(self.cell_costs, np.float64)
         if self.costs == "hard":
             return self.beta_ * station_costs(layout, goals, costs)
-        beta = self.beta_
+        beta, within = self.beta_, None if region is None else (region,)
         if uniform and self.beta is None:
-            beta = max(beta, walk_graph(layout, goals).divergence_cost + _MARGIN)
+            beta = max(beta, walk_graph(layout, goals, within).divergence_cost + _MARGIN)
         try:
-            return soft_costs(layout, goals, beta * costs)
+            return soft_costs(layout, goals, beta * costs, within)
         except ValueError as error:
             raise ValueError(f"{error}; raise `beta` ({self.beta_:.4g}) or give beta='fit'") from error
 

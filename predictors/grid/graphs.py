@@ -8,7 +8,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from legible_envs.overcooked.grid import NEIGHBOURS
+from legible_envs.overcooked.grid import NEIGHBOURS, Cell
 from legible_envs.overcooked.layout import OvercookedLayout
 from predictors.grid.walk_kernels import cheapest_costs, walk_costs
 
@@ -17,7 +17,7 @@ __all__ = ["WalkGraph", "soft_costs", "station_costs", "walk_graph"]
 
 @dataclass(frozen=True, eq=False)
 class WalkGraph:
-    """The floor cells from which some of the given stations can be reached.
+    """The floor cells from which some of the given stations can be reached, by anybody or by one person.
 
     Attributes:
         layout: The kitchen.
@@ -50,13 +50,21 @@ class WalkGraph:
 
 
 @lru_cache(maxsize=256)
-def walk_graph(layout: OvercookedLayout, goals: tuple[str, ...]) -> WalkGraph:
+def walk_graph(layout: OvercookedLayout, goals: tuple[str, ...], within: tuple[Cell, ...] | None = None) -> WalkGraph:
     """The floor of a kitchen from which some of the goals can be reached.
+
+    Args:
+        layout: The kitchen.
+        goals: ``K`` names of stations.
+        within: Only floor connected with one of these cells, of people who walk there: a divided kitchen has floor that
+            is out of their reach (:mod:`legible_envs.overcooked.reach`). None for all floor.
 
     Raises:
         LayoutError: A goal is not a station of this kitchen.
     """
     reach = layout.distances_from([cell for goal in goals for cell in layout.access(goal)]) >= 0
+    if within is not None:
+        reach &= layout.distances_from(within) >= 0
     cells = np.argwhere(reach)
     index = np.full(layout.shape, -1, dtype=np.int64)
     index[reach] = np.arange(len(cells))
@@ -65,7 +73,8 @@ def walk_graph(layout: OvercookedLayout, goals: tuple[str, ...]) -> WalkGraph:
     access = np.zeros((len(cells), len(goals)))
     for column, goal in enumerate(goals):
         for row, col in layout.access(goal):
-            access[index[row, col], column] = 1.0
+            if index[row, col] >= 0:
+                access[index[row, col], column] = 1.0
     away = np.where(neighbours >= 0, np.abs(neighbours - np.arange(len(cells))[:, None]), 0)
     return WalkGraph(layout, goals, cells, index, neighbours, access, int(away.max(initial=0)))
 
@@ -89,7 +98,10 @@ def station_costs(
 
 
 def soft_costs(
-    layout: OvercookedLayout, goals: tuple[str, ...], cell_costs: npt.NDArray[np.float64]
+    layout: OvercookedLayout,
+    goals: tuple[str, ...],
+    cell_costs: npt.NDArray[np.float64],
+    within: tuple[Cell, ...] | None = None,
 ) -> npt.NDArray[np.float64]:
     """``-log Z``: the soft minimum of the costs of all paths from every cell into each station.
 
@@ -97,6 +109,7 @@ def soft_costs(
         layout: The kitchen.
         goals: ``K`` names of stations.
         cell_costs: ``(H, W)`` of entering each cell; entering the station is free.
+        within: Only from floor connected with one of these cells; None for all floor. Elsewhere the sum may diverge.
 
     Returns:
         ``(H, W, K)``, ``inf`` where there is no path. A station's own cell is 0 from itself.
@@ -104,7 +117,7 @@ def soft_costs(
     Raises:
         ValueError: The sum over all paths diverges, as steps cost too little.
     """
-    graph = walk_graph(layout, goals)
+    graph = walk_graph(layout, goals, within)
     costs = _of_cells(graph, cell_costs)
     values, finite = walk_costs(costs, graph.neighbours, graph.band, graph.access)
     if not finite:

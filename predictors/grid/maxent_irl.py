@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 import numpy as np
 import numpy.typing as npt
 
+from legible_envs.overcooked.grid import Cell
 from legible_envs.overcooked.layout import OvercookedLayout
+from legible_envs.overcooked.reach import reach_from
 from legible_envs.rollouts.trajectory import Trajectory
 from legible_envs.support.validation import choice, integer, real
 from predictors.base import check_trajectories
@@ -94,7 +96,7 @@ class MaxEntIRL(GridPredictor):
     log_likelihood_: float
     n_iter_: int
     converged_: bool
-    _tables: dict[tuple[OvercookedLayout, tuple[str, ...]], Floats]
+    _tables: dict[tuple[OvercookedLayout, tuple[str, ...], Cell | None], Floats]
 
     def __init__(
         self,
@@ -190,18 +192,25 @@ class MaxEntIRL(GridPredictor):
             costs += (np.asarray(self._feature_map()(layout)) @ weights).reshape(layout.shape)
         return costs
 
-    def goal_costs(self, layout: OvercookedLayout, goals: tuple[str, ...]) -> Floats:
+    def goal_costs(self, layout: OvercookedLayout, goals: tuple[str, ...], cell: Cell | None = None) -> Floats:
         """``(H, W, K)`` ``-log Z`` from each cell into each goal.
+
+        Args:
+            layout: The kitchen.
+            goals: ``K`` names of stations.
+            cell: Where the person is; costs are then those of the floor in their reach. None for all floor.
 
         Raises:
             LayoutError: A goal is not a station of this kitchen.
             ValueError: A kitchen that ``fit`` did not see, in which the sum over paths diverges at the learned costs.
         """
-        table = self._tables.get((layout, goals))
+        region = None if cell is None else reach_from(layout, cell).region
+        table = self._tables.get((layout, goals, region))
         if table is None:
             if len(self._tables) >= 256:
                 self._tables.clear()
-            table = self._tables[layout, goals] = soft_costs(layout, goals, self.cost_map(layout))
+            within = None if region is None else (region,)
+            table = self._tables[layout, goals, region] = soft_costs(layout, goals, self.cost_map(layout), within)
         return table
 
     def candidate_probabilities(self, trajectory: Trajectory) -> Floats:
@@ -225,7 +234,7 @@ class MaxEntIRL(GridPredictor):
             self.candidate_columns(trajectory)
             goal = trajectory.goal or ""
             cells = trajectory.states[:-1]
-            table = self.goal_costs(layout, (goal,))
+            table = self.goal_costs(layout, (goal,), (int(cells[0, 0]), int(cells[0, 1])))
             result[number] = table[(*cells[0], 0)] - self.cost_map(layout)[cells[1:, 0], cells[1:, 1]].sum()
         return result
 

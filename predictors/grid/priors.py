@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import Trajectory
 from legible_envs.support.validation import choice
+from predictors.grid.candidates import within_reach
 
 __all__ = ["PRIORS", "GoalPrior", "Prior"]
 
@@ -40,7 +41,7 @@ class GoalPrior:
         if kind == "empirical":
             known = [trajectory for trajectory in trajectories if trajectory.goal is not None]
             chosen = Counter(trajectory.goal for trajectory in known)
-            offered = Counter(name for trajectory in known for name in trajectory.candidates)
+            offered = Counter(name for trajectory in known for name in within_reach(trajectory).candidates)
             names = classes.tolist()
             self._rates = {name: (chosen[name] + 1.0) / (offered[name] + len(names)) for name in names}
 

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.overcooked.layout import OvercookedLayout
+from legible_envs.overcooked.reach import reach_from
 from legible_envs.rollouts.trajectory import Trajectory
 from predictors.grid.graphs import WalkGraph, walk_graph
 from predictors.grid.walk_kernels import likelihood
@@ -31,7 +32,7 @@ class Evidence:
     """Sufficient statistics of all trajectories in one kitchen for the likelihood.
 
     Attributes:
-        graph: The floor in reach of the goals.
+        graph: The floor in reach of the goals and of the people.
         visits: ``(n,)`` how often cells were entered, first cells not counted.
         starts: ``(P,)`` first cell of each group of trajectories that share it and the goal.
         goals: ``(P,)`` column of its goal.
@@ -84,7 +85,8 @@ def collect_evidence(trajectories: Sequence[Trajectory]) -> dict[OvercookedLayou
 
 def _sum_up(layout: OvercookedLayout, trajectories: Sequence[Trajectory]) -> Evidence:
     names = tuple(sorted({trajectory.goal for trajectory in trajectories if trajectory.goal is not None}))
-    graph = walk_graph(layout, names)
+    regions = {reach_from(layout, trajectory.states[0]).region for trajectory in trajectories}
+    graph = walk_graph(layout, names, tuple(sorted(region for region in regions if region is not None)))
     visits = np.zeros(len(graph.cells))
     pairs: Counter[tuple[int, int]] = Counter()
     for trajectory in trajectories:

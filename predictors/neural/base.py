@@ -27,6 +27,7 @@ from predictors.base import (
     prefix_lengths,
 )
 from predictors.grid.base import check_recorded, check_trajectory
+from predictors.grid.candidates import within_reach
 from predictors.neural.encoding import Encoding
 from predictors.neural.networks import NUMPY, Network, Weights, softmax
 from predictors.neural.training import Examples, Training, require_torch, train
@@ -282,7 +283,7 @@ class NeuralPredictor(GoalPredictor):
     def _allowed(self, trajectories: Sequence[Trajectory]) -> npt.NDArray[np.bool_]:
         allowed = np.zeros((len(trajectories), len(self.classes_)), dtype=bool)
         for row, trajectory in enumerate(trajectories):
-            allowed[row, self.candidate_columns(trajectory)] = True
+            allowed[row, self.candidate_columns(within_reach(trajectory))] = True
         return allowed
 
     def _examples(self, trajectories: Sequence[Trajectory], encoding: Encoding) -> Examples:
@@ -364,6 +365,8 @@ class NeuralStream(GoalStream):
     def _advance(self) -> None:
         predictor = self._neural
         recent = np.array([self._points[0], *self._points[-2:]])
+        if len(self._points) == 1:  # where the person stands tells which goals are in reach
+            self._allowed = predictor._allowed([self._observed()])
         if len(self._points) < 3:  # the kind of points cannot change later
             predictor.encoding_.check(self._observed())
         if self._context.layout is not None and predictor.encoding_.grid:

@@ -19,7 +19,7 @@ from benchmarks.cli.options import typed_value
 from benchmarks.console import number, plural
 from benchmarks.presenters.overcooked import load_kitchen
 from legible_envs import __version__
-from legible_envs.overcooked import OvercookedLayout, OvercookedWorkspace
+from legible_envs.overcooked import OvercookedLayout, OvercookedScorer, OvercookedWorkspace, soup_task
 from tests.support.command_line import legible, values
 from tests.support.run_folders import write_run
 
@@ -78,6 +78,45 @@ def test_kitchens_outside_the_design_rules_are_scored_and_said_to_be(tmp_path: P
     assert "onion" in found["design rules"]
     assert found["task"] == "onion + onion + onion"
     assert float(found["normalised"]) <= 1
+
+
+DIVIDED = """\
+XOXXXXXOX
+S   P   X
+X 2 X 1 S
+X   D   X
+XOXXXXXXX
+"""
+
+
+def test_score_and_show_are_of_one_player(tmp_path: Path) -> None:
+    (tmp_path / "divided.txt").write_text(DIVIDED)
+    scorer = OvercookedScorer(soup_task([("onion",) * 3]))
+    for arguments, player in (((), 1), (("--player", 1), 1), (("--player", 2), 2)):
+        found = values(legible("score", tmp_path / "divided.txt", *arguments))
+        wanted = scorer.score_layout(OvercookedLayout.from_ascii(DIVIDED), player=player)
+        assert float(found["legibility"]) == pytest.approx(wanted["score"], abs=1e-3)
+        assert (found["player"], found["out of reach"]) == (str(player), ", ".join(wanted["out_of_reach"]))
+    shown = legible("show", tmp_path / "divided.txt", "--player", 2, "--out", tmp_path / "divided.png")
+    assert "onion@(4,1)" in shown.output
+    assert "onion@(0,7)" in shown.output.split("Reaches")[0]
+    assert "onion@(0,7)" not in shown.output.split("Reaches")[1]
+    refused = legible("score", tmp_path / "divided.txt", "--player", 3)
+    assert (refused.exit_code, refused.output) == (
+        2,
+        "Error: `player` must be an integer from 1 to 2 (the kitchen has 2 starts), got 3\n",
+    )
+    assert "player" not in values(legible("score", "-", text=KITCHEN))
+    assert values(legible("score", "-", "--player", 1, text=KITCHEN))["player"] == "1"
+
+
+def test_score_says_in_words_that_nobody_can_do_the_task_alone() -> None:
+    result = legible("score", "-", text="XXOXX\nO1X2P\nD X S\nXXXXX\n")
+    assert (result.exit_code, result.output) == (
+        2,
+        "Error: the task cannot be done in this kitchen by player 1, who starts at row 1, column 1: out of reach are "
+        "the pot station (row 1, column 4) and the serving station (row 2, column 4)\n",
+    )
 
 
 def test_score_and_show_of_a_run_use_its_best_layout(run: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -124,5 +125,6 @@ def test_bad_parameters_and_goals_out_of_reach_are_refused() -> None:
         ShortestDistance("taxi").fit([walk([(1, 1)])]).predict_proba([walk([(1, 1)])])  # type: ignore[arg-type]
     split = OvercookedLayout.from_ascii("XOXTX\nX X D\nX X X\nXXPXX")
     apart = walk([(1, 1), (0, 1)], layout=split)
+    there = replace(apart.first(1), goal=None, candidates=("tomato", "dish"))
     with pytest.raises(ValueError, match=r"'tomato' cannot be reached from row 1, column 1"):
-        BayesianGoalPredictor().fit([apart]).predict_proba([apart])
+        BayesianGoalPredictor().fit([apart]).predict_proba([there])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -21,6 +22,8 @@ from predictors import (
     GridNeighbours,
     GridNGram,
     MaxEntIRL,
+    RecurrentPredictor,
+    ShortestDistance,
 )
 from predictors.grid.graphs import walk_graph
 from predictors.grid.nearest_kernels import votes_of_nearest
@@ -305,13 +308,105 @@ def test_learning_from_states_that_do_not_fit_is_refused_in_words(predictor: Goa
         clone(predictor).fit([*walks, wrong])
 
 
-def test_goals_out_of_reach_are_named() -> None:
+HALVES = OvercookedLayout.from_ascii("XOXXXXXXOX\nX   PX   X\nT 2  D 1 X\nX   PX   X\nXXSXXXXXTX")
+"""Each half has an onion and a tomato station; the dishes between them are in reach of both."""
+
+
+def halves() -> list[Trajectory]:
+    """Trajectories of both players, with the candidates in reach of each."""
+    own = {2: ("dish", "onion@(0,1)", "tomato@(2,0)"), 1: ("dish", "onion@(0,8)", "tomato@(4,8)")}
+    ways = [
+        (2, [(1, 3), (1, 2), (1, 1), (0, 1)]),
+        (2, [(3, 3), (3, 2), (2, 2), (2, 1), (2, 0)]),
+        (2, [(3, 2), (2, 2), (2, 3), (2, 4), (2, 5)]),
+        (1, [(1, 6), (1, 7), (1, 8), (0, 8)]),
+        (1, [(2, 6), (3, 6), (3, 7), (3, 8), (4, 8)]),
+        (1, [(1, 7), (2, 7), (2, 6), (2, 5)]),
+    ]
+    found = []
+    for player, cells in ways:
+        goal = HALVES.station_at(cells[-1])
+        found.append(Trajectory(cells, start="pot", goal=goal, candidates=own[player], layout=HALVES))
+    return found
+
+
+NEURAL = RecurrentPredictor(4, members=1, max_epochs=1, validation_fraction=0.0)
+
+
+@pytest.mark.parametrize(
+    "predictor", [*BAYESIAN[:5], *LEARNERS, ShortestDistance(), ShortestDistance("geodesic"), NEURAL], ids=repr
+)
+def test_candidates_out_of_reach_are_no_goals(predictor: GoalPredictor) -> None:
+    walks = halves()
+    everything = tuple(sorted({name for each in walks for name in each.candidates}))
+    fitted = clone(predictor).fit(walks)
+    of_all = clone(predictor).fit([replace(each, candidates=everything) for each in walks])
+    np.testing.assert_array_equal(of_all.predict_proba(walks), fitted.predict_proba(walks))
+    for each in walks:
+        for count in range(1, each.num_states + 1):
+            alone, among_all = each.first(count), replace(each.first(count), candidates=everything)
+            row = fitted.predict_proba([among_all])[0]
+            np.testing.assert_array_equal(row, fitted.predict_proba([alone])[0])
+            assert not row[[name not in each.candidates for name in fitted.classes_.tolist()]].any()
+            assert row.sum() == pytest.approx(1.0)
+            positions = [HALVES.stations[name] for name in everything]
+            placed = replace(among_all, goal_positions=positions)
+            np.testing.assert_array_equal(fitted.predict_proba([placed])[0], row)
+    stream = fitted.stream(replace(walks[0], candidates=everything, goal=None))
+    for count, cell in enumerate(walks[0].states[:-1], 1):
+        belief = stream.update(cell)
+        assert belief.keys() == set(everything)
+        own = fitted.predict_proba([walks[0].first(count)])[0]
+        of_own = [own[fitted.classes_.tolist().index(name)] for name in everything]
+        assert [belief[name] for name in everything] == pytest.approx(of_own, abs=1e-12)
+
+
+def test_costs_are_those_of_the_floor_in_the_persons_reach() -> None:
+    """A corridor and an open room share the dishes; in the room the sum over paths diverges earlier."""
+    rows = [
+        "XOXXXXXXXXOX",
+        "X XX       X",
+        "X XX       X",
+        "T 1D       X",
+        "X XX       X",
+        "XXXX   2   X",
+        "XXXXXXXXXPXX",
+    ]
+    whole, alone = (OvercookedLayout.from_rows(one) for one in (rows, [row[:4] + "X" * 8 for row in rows]))
+    ways = [
+        [(3, 1), (2, 1), (1, 1), (0, 1)],
+        [(2, 1), (1, 1), (2, 1), (3, 1), (3, 0)],
+        [(2, 1), (3, 1), (3, 2), (3, 3)],
+        [(1, 1), (2, 1), (3, 1), (4, 1), (3, 1), (3, 2), (3, 3)],
+    ]
+    of_whole, of_alone = (
+        [Trajectory(way, goal=one.station_at(way[-1]), candidates=names, layout=one) for way in ways]
+        for one, names in ((whole, ("dish", "onion@(0,1)", "tomato")), (alone, ("dish", "onion", "tomato")))
+    )
+    others = (BayesianGoalPredictor(0.85, costs="soft"), MaxEntIRL(features=np.ones((84, 1))))
+    for predictor in (*BAYESIAN[:5], *LEARNERS, *others):
+        one, other = clone(predictor).fit(of_whole), clone(predictor).fit(of_alone)
+        for seen, same in zip(of_whole, of_alone, strict=True):
+            for count in range(seen.num_states + 1):
+                found, wanted = (p.predict_proba([w.first(count)])[0] for p, w in ((one, seen), (other, same)))
+                np.testing.assert_allclose(found, wanted, atol=1e-9, err_msg=repr(predictor))
+        if isinstance(one, MaxEntIRL) and isinstance(other, MaxEntIRL):
+            assert one.uniform_cost_ == pytest.approx(other.uniform_cost_)
+            np.testing.assert_allclose(one.log_likelihoods(of_whole), other.log_likelihoods(of_alone))
+    with pytest.raises(ValueError, match="diverges"):
+        BayesianGoalPredictor(0.85, costs="soft").fit(of_whole).goal_costs(whole, of_whole[0].candidates)
+
+
+def test_where_no_candidate_is_in_reach_they_are_named() -> None:
     split = OvercookedLayout.from_ascii("XOXTX\nX X D\nX X X\nXXPXX")
     ways = [walk([(1, 1), (0, 1)], layout=split), walk([(2, 1), (1, 1), (0, 1)], layout=split)]
     for predictor in (*BAYESIAN[:5], MaxEntIRL()):
         fitted = clone(predictor).fit(ways)
+        belief = dict(zip(fitted.classes_.tolist(), fitted.predict_proba([ways[0].first(1)])[0], strict=True))
+        assert belief == {"onion": 1.0} | {name: 0.0 for name in ways[0].candidates if name != "onion"}
+        there = replace(ways[0].first(1), goal=None, candidates=("tomato", "dish"))
         with pytest.raises(ValueError, match=r"'tomato' cannot be reached from row 1, column 1"):
-            fitted.predict_proba([ways[0].first(1)])
+            fitted.predict_proba([there])
 
 
 def test_bad_parameters_are_refused() -> None:

@@ -343,32 +343,42 @@ class OvercookedWorkspace(Workspace):
     # -- one layout ------------------------------------------------------------------------------------------------
 
     def _one(self, genome: npt.ArrayLike | OvercookedLayout) -> OvercookedLayout:
+        """The layout of a genome; a layout that has a genome stays as it is, players' starts and all."""
         if isinstance(genome, OvercookedLayout):
-            return self.decode(self.encode(genome))
+            self.encode(genome)
+            return genome
         return self.decode(genome)
 
-    def summary(self, genome: npt.ArrayLike | OvercookedLayout) -> dict[str, Any]:
+    def summary(self, genome: npt.ArrayLike | OvercookedLayout, *, player: int = 1) -> dict[str, Any]:
         """Score, distance and what belongs beside them, as plain data.
 
         See :func:`~legible_envs.overcooked.scoring.explanation.score_layout` for the keys. Workspaces that start
         from an existing kitchen add ``relocations``.
+
+        Args:
+            genome: ``(d,)``, whose person starts at serving, or the kitchen.
+            player: Whose score it is, by the number of their start in the kitchen.
         """
         layout = self._one(genome)
-        result = self.scorer.score_layout(layout)
+        result = self.scorer.score_layout(layout, player=player)
         if self._home is not None:
             result["relocations"] = int(self.relocations(self.encode(layout)[None])[0])
         return result
 
-    def explain(self, genome: npt.ArrayLike | OvercookedLayout) -> list[dict[str, Any]]:
+    def explain(self, genome: npt.ArrayLike | OvercookedLayout, *, player: int = 1) -> list[dict[str, Any]]:
         """Where the layout wins and loses its score: a row per stage and goal, the greatest loss first.
 
-        See :func:`~legible_envs.overcooked.scoring.explanation.explain_layout` for what a row holds.
+        See :func:`~legible_envs.overcooked.scoring.explanation.explain_layout` for what a row holds, and
+        :meth:`summary` for the arguments.
         """
-        return self.scorer.explain_layout(self._one(genome))
+        return self.scorer.explain_layout(self._one(genome), player=player)
 
-    def ambiguity(self, genome: npt.ArrayLike | OvercookedLayout) -> Array:
-        """``(H, W)`` how often an observer would predict a wrong goal at each cell; NaN off all trajectories."""
-        return self.scorer.ambiguity(self._one(genome))
+    def ambiguity(self, genome: npt.ArrayLike | OvercookedLayout, *, player: int = 1) -> Array:
+        """``(H, W)`` how often an observer would predict a wrong goal at each cell; NaN off all trajectories.
+
+        See :meth:`summary` for the arguments.
+        """
+        return self.scorer.ambiguity(self._one(genome), player=player)
 
     # -- configuration ---------------------------------------------------------------------------------------------
 

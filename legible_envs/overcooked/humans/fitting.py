@@ -14,7 +14,7 @@ from legible_envs.overcooked.grid_kernels import costs_to, neighbour
 from legible_envs.overcooked.humans.kernels import GoalField, is_option
 from legible_envs.overcooked.layout import FLOOR, OvercookedLayout
 from legible_envs.rollouts.trajectory import Trajectory
-from legible_envs.support.validation import real
+from legible_envs.support.validation import real, shown
 
 __all__ = ["RationalityFit", "RationalitySpread", "fit_rationality", "goal_field", "rationality_spread"]
 
@@ -121,6 +121,9 @@ def fit_rationality(
         0.347
     """
     listed = list(trajectories)
+    for number, trajectory in enumerate(listed):
+        if not isinstance(trajectory, Trajectory):
+            raise ValueError(f"expected trajectories, got {shown(trajectory)} at index {number}")
     confidence = real("confidence", confidence, 0, 1, closed="neither")
     names = sorted({trajectory.participant for trajectory in listed})
     steps = _collect(listed, names, cell_costs)

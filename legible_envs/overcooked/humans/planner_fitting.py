@@ -98,7 +98,12 @@ def fit_planner(trajectories: Sequence[Trajectory], grid: Mapping[str, Sequence[
     Args:
         trajectories: Trajectories with a kitchen, a goal and a participant.
         grid: Values tried.
+
+    Raises:
+        ValueError: No trajectories, or some without a kitchen or a goal.
     """
+    if not len(trajectories):
+        raise ValueError("the planner is fitted to at least one trajectory, got none")
     recorded = _prepared(trajectories)
     who = np.repeat([name for *_, name in recorded], [len(path) - 1 for path, *_ in recorded])
     seen: dict[tuple[float, ...], tuple[Floats, Floats]] = {}

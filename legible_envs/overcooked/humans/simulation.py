@@ -20,7 +20,6 @@ from typing import Any, Final, Literal
 import numpy as np
 import numpy.typing as npt
 
-from legible_envs.errors import LayoutError
 from legible_envs.overcooked.humans.fitting import (
     RationalityFit,
     RationalitySpread,
@@ -28,8 +27,9 @@ from legible_envs.overcooked.humans.fitting import (
     rationality_spread,
 )
 from legible_envs.overcooked.humans.kernels import BOLTZMANN, PLANNER
-from legible_envs.overcooked.humans.walker import Walker, draw_one, draw_preferences, in_reach
+from legible_envs.overcooked.humans.walker import Walker, draw_one, draw_preferences, nearest_first
 from legible_envs.overcooked.layout import OvercookedLayout
+from legible_envs.overcooked.reach import Reach, reach_of
 from legible_envs.overcooked.recipes import soup_task
 from legible_envs.overcooked.scoring.boltzmann import DEFAULT_RATIONALITY
 from legible_envs.rollouts.trajectory import Trajectory
@@ -188,6 +188,7 @@ def simulate_participants(
     rng: np.random.Generator,
     *,
     task: TaskGraph | None = None,
+    player: int = 1,
     population: PopulationName | Callable[..., Walker] | None = None,
     executions: int = 1,
     participant: str = "person",
@@ -201,13 +202,14 @@ def simulate_participants(
     sequence: that is a trajectory, with the valid goals as candidates (candidate set ``task``). The legs that follow,
     such as back to the pot, take their time, but leave nothing to predict and give no trajectory; nothing waits for
     the cooking. Where a type of station repeats, each one in reach is a goal, equally likely; other stops are the
-    nearest of their type.
+    nearest of their type. What is out of the player's reach is no goal (:mod:`legible_envs.overcooked.reach`).
 
     Args:
         layout: The kitchen.
         n: Number of participants.
         rng: Source of all randomness.
         task: The task over station types; the paper's three soups if None.
+        player: Whose part of the kitchen the participants are in, by the number of their start.
         population: Each participant is drawn anew from it: ``"boltzmann"`` (also None) or ``"planner"``, or a
             callable that makes one participant's walker, called with (shape, rng).
         executions: How often each participant does the task.
@@ -217,7 +219,7 @@ def simulate_participants(
         **settings: Of the population: arguments of :meth:`BoltzmannWalker.draw` or :meth:`PlannerWalker.draw`.
 
     Raises:
-        LayoutError: The task cannot be done in this kitchen.
+        LayoutError: The player cannot do the task in this kitchen (names types and places), or there is no such player.
         ValueError: Unknown population, or a number out of range.
     """
     task = task or soup_task()
@@ -226,6 +228,8 @@ def simulate_participants(
     n, executions = integer("n", n, 0), integer("executions", executions, 0)
     if isinstance(population, str) and population not in _POPULATIONS:
         raise ValueError(f"`population` must be one of {list(_POPULATIONS)} or a callable, got {population!r}")
+    reach = reach_of(layout, player)
+    reach.check_task(task)
     draw = _POPULATIONS[population] if isinstance(population, str) else population
     found: list[Trajectory] = []
     for number in range(n):
@@ -233,13 +237,13 @@ def simulate_participants(
         labels = {"participant": f"{participant}/{number}", "condition": condition, "layout_name": layout_name}
         clock = 0
         for _ in range(executions):
-            done, clock = _execute(layout, task, person, clock, rng, labels)
+            done, clock = _execute(reach, task, person, clock, rng, labels)
             found += done
     return found
 
 
 def _execute(
-    layout: OvercookedLayout,
+    reach: Reach,
     task: TaskGraph,
     person: Walker,
     clock: int,
@@ -247,15 +251,13 @@ def _execute(
     labels: Mapping[str, Any],
 ) -> tuple[list[Trajectory], int]:
     """One task execution: its trajectories, and the tick at its end."""
-    places = layout.named(task.start)
-    if not places:
-        raise LayoutError(f"the task needs a {task.start} station; this kitchen has none", rule="station")
+    layout, places = reach.layout, reach.named(task.start)
     place = places[int(rng.integers(len(places)))]
-    cell = draw_one(layout.access(place), place, rng)
+    cell = draw_one(reach.access(place), place, rng)
     found = []
     for step in task.sample(rng):
-        candidates = tuple(name for kind in step.goals for name in in_reach(layout, cell, kind))
-        goals = [name for name in candidates if name.partition("@")[0] == step.goal]
+        candidates = tuple(name for kind in step.goals for name in nearest_first(reach, cell, kind))
+        goals = [name for name in candidates if name in reach.named(step.goal)]
         goal = goals[int(rng.integers(len(goals)))]
         states, ticks = person.leg(layout, cell, place, goal, rng)
         found.append(
@@ -273,7 +275,7 @@ def _execute(
         clock += int(ticks[-1])
         place, cell = goal, (int(states[-2][0]), int(states[-2][1]))
         for kind in step.then:
-            stop = in_reach(layout, cell, kind)[0]
+            stop = nearest_first(reach, cell, kind)[0]
             states, ticks = person.leg(layout, cell, place, stop, rng)
             clock += int(ticks[-1])
             place, cell = stop, (int(states[-2][0]), int(states[-2][1]))

@@ -16,10 +16,11 @@ from legible_envs.overcooked.grid_kernels import neighbour
 from legible_envs.overcooked.humans.fitting import goal_field
 from legible_envs.overcooked.humans.kernels import GoalField, sample_times, sample_walk
 from legible_envs.overcooked.layout import OvercookedLayout
+from legible_envs.overcooked.reach import Reach, reach_from
 from legible_envs.rollouts.trajectory import Trajectory
-from legible_envs.support.validation import real
+from legible_envs.support.validation import entries, real, shown
 
-__all__ = ["Walker", "draw_one", "draw_preferences", "in_reach"]
+__all__ = ["Walker", "draw_one", "draw_preferences", "nearest_first"]
 
 Floats = npt.NDArray[np.float64]
 
@@ -55,7 +56,10 @@ class Walker(ABC):
         self.tick = real("tick", tick, 0)
         if self.idle + self.turn >= 1:
             raise ValueError(f"idle + turn must be less than 1, got {idle!r} + {turn!r}: the person would never move")
-        self.preferences = None if preferences is None else np.array(preferences, dtype=np.float64)
+        try:
+            self.preferences = None if preferences is None else np.array(preferences, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise ValueError(f"`preferences` must be an (H, W) array of costs, got {shown(preferences)}") from error
         if self.preferences is not None and not ((self.preferences > 0) & (self.preferences < np.inf)).all():
             raise ValueError("preferences are costs of stepping on cells: they must be finite and greater than 0")
         self._fields = lru_cache(maxsize=256)(self._make_field)
@@ -87,7 +91,7 @@ class Walker(ABC):
             rng: Source of randomness.
 
         Raises:
-            LayoutError: No such station, a start that is no floor cell, or no path.
+            LayoutError: No such station, a start that is neither a station nor a floor cell, or no path.
             RuntimeError: The person did not find the goal in 100,000 steps.
         """
         cell = self._start_cell(layout, start, goal, rng)
@@ -113,27 +117,31 @@ class Walker(ABC):
             goals: The goal, or goals of which one is drawn for each trajectory.
             n: How many trajectories.
             rng: Source of randomness.
-            candidates: Goals that an observer takes for possible; ``goals`` if None.
+            candidates: Goals that an observer takes for possible, ``goals`` if None; those that cannot be reached from
+                where a trajectory begins are left out of it.
             **labels: Further attributes of :class:`~legible_envs.rollouts.Trajectory`, such as ``participant``.
 
         Raises:
             LayoutError: No such station, or no path from the start to a goal.
             RuntimeError: The person did not find the goal in 100,000 steps.
         """
-        names = (goals,) if isinstance(goals, str) else tuple(goals)
+        names = (goals,) if isinstance(goals, str) else tuple(entries(goals))
+        if not names:
+            raise LayoutError(f"`goals` must name at least one station, got {shown(goals)}", rule="station")
         labels = {"condition": "simulated", **labels}
         found = []
         for _ in range(n):
             goal = names[int(rng.integers(len(names)))]
             cell = self._start_cell(layout, start, goal, rng)
             states, ticks = self.leg(layout, cell, start, goal, rng)
+            out_of_reach = reach_from(layout, cell).out_of_reach
             found.append(
                 Trajectory(
                     states=states,
                     times=self.seconds(ticks),
                     start=start,
                     goal=goal,
-                    candidates=tuple(candidates or names),
+                    candidates=tuple(name for name in candidates or names if name not in out_of_reach),
                     layout=layout,
                     **labels,
                 )
@@ -165,12 +173,17 @@ class Walker(ABC):
 
     def _start_cell(self, layout: OvercookedLayout, start: str | Cell, goal: str, rng: np.random.Generator) -> Cell:
         """The cell of a start, from which the goal can be reached; one of several at random."""
+        if not isinstance(start, str) and len(entries(start)) != 2:
+            raise LayoutError(
+                f"`start` must be a station's name or a cell (row, column), got {shown(start)}", rule="start"
+            )
         cells = layout.access(start) if isinstance(start, str) else ((int(start[0]), int(start[1])),)
         if not isinstance(start, str) and not layout.is_floor(cells[0]):
             raise LayoutError(f"row {start[0]}, column {start[1]} is no floor cell", rule="start", cell=cells[0])
         field = self._field(layout, goal)
         near = [cell for cell in cells if field.cost_to_go[cell[0] * field.width + cell[1]] < np.inf]
-        return draw_one(near, f"no path to {goal!r} from {start!r}", rng)
+        where = repr(start) if isinstance(start, str) else f"row {start[0]}, column {start[1]}"
+        return draw_one(near, f"no path to {goal!r} from {where}", rng)
 
     def _make_field(self, layout: OvercookedLayout, goal: str) -> GoalField:
         return goal_field(layout, layout.stations[goal], self.costs(layout.shape))
@@ -180,7 +193,8 @@ class Walker(ABC):
         path = np.empty(LONGEST, dtype=np.int64)
         length = sample_walk(self.kind, self.params, start, field, rng, path)
         if length == 0:
-            raise RuntimeError(f"{self!r} did not find the goal within {LONGEST:,} steps")
+            row, col = divmod(field.station, field.width)
+            raise RuntimeError(f"{self} did not find the goal at row {row}, column {col} within {LONGEST:,} steps")
         return path[:length].copy()
 
     def __reduce__(self) -> tuple[object, ...]:
@@ -207,18 +221,16 @@ def _shortest_field(layout: OvercookedLayout, name: str) -> GoalField:
     return goal_field(layout, layout.stations[name])
 
 
-def in_reach(layout: OvercookedLayout, cell: Cell, kind: str) -> list[str]:
-    """Stations of one type that a person can reach, the nearest first."""
-    at = cell[0] * layout.shape[1] + cell[1]
-    steps = {name: float(_shortest_field(layout, name).cost_to_go[at]) for name in layout.named(kind)}
-    found = sorted((name for name in steps if steps[name] < np.inf), key=lambda name: steps[name])
-    if not found:
-        raise LayoutError(
-            f"no {kind} station can be reached from row {cell[0]}, column {cell[1]}; the task needs one",
-            rule="reachable",
-            cell=cell,
-        )
-    return found
+def nearest_first(reach: Reach, cell: Cell, place: str) -> list[str]:
+    """The stations in reach that a task means by a place, those nearest to a floor cell first.
+
+    Args:
+        reach: What the person can get to.
+        cell: A cell where the person can stand.
+        place: A station's name, or a type.
+    """
+    at = cell[0] * reach.layout.shape[1] + cell[1]
+    return sorted(reach.named(place), key=lambda name: float(_shortest_field(reach.layout, name).cost_to_go[at]))
 
 
 def draw_preferences(shape: tuple[int, int], rng: np.random.Generator, preference: float) -> Floats | None:

@@ -34,7 +34,9 @@ from legible_envs.legibility import (
     Graph,
     Node,
     PrefixScore,
+    costs_to_goals,
     env_legibility,
+    in_words,
     optimal_costs,
     posterior,
     prefix_weights,
@@ -173,7 +175,7 @@ def boltzmann_trajectories(
     """
     to_goal = optimal_costs(graph, goal)
     if start not in to_goal:
-        raise ValueError(f"no path from {start!r} to {goal!r}")
+        raise ValueError(f"no path from {in_words(start)} to {in_words(goal)}")
     nodes = list(to_goal)
     index = {node: i for i, node in enumerate(nodes)}
     steps = np.zeros((len(nodes), len(nodes)))
@@ -191,7 +193,7 @@ def boltzmann_trajectories(
     by_length = arrives[:, index[start]]
     arrived = math.fsum(by_length)
     if arrived == 0.0:
-        raise ValueError(f"no trajectory from {start!r} to {goal!r} arrives within {horizon} steps")
+        raise ValueError(f"no trajectory from {in_words(start)} to {in_words(goal)} arrives within {horizon} steps")
     weights = np.zeros((horizon + 1, horizon + 1))
     for length in range(2, horizon + 1):
         weights[length, 1:length] = prefix_weights(prefix, length)
@@ -231,10 +233,7 @@ def boltzmann_legibility(
     Raises:
         ValueError: A goal cannot be reached from the start.
     """
-    costs = {g: optimal_costs(graph, g) for g in goals}
-    unreachable = [g for g in goals if start not in costs[g]]
-    if unreachable:
-        raise ValueError(f"no path from {start!r} to {unreachable}")
+    costs = costs_to_goals(graph, start, goals)
     optimal = {g: costs[g][start] for g in goals}
     seen = {}
     for node in {visit.node for visit in trajectories.visits}:

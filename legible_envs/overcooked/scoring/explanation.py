@@ -3,6 +3,10 @@
 These functions follow the readable definition, so stations may repeat, stand inside and have several access cells.
 Where a type repeats, each of its stations is a goal, the person leaves from each of them equally often, and the legs
 that follow a goal (to the pot, to serving) lead to the nearest.
+
+A score is of a person, player 1 unless another is asked for. Stations out of their reach
+(:mod:`legible_envs.overcooked.reach`) are no goals, and the score is that of the same kitchen with a counter in place
+of each; it is an error only if the task cannot be done with those in reach.
 """
 
 from __future__ import annotations
@@ -15,11 +19,11 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 import numpy.typing as npt
 
-from legible_envs.errors import LayoutError
 from legible_envs.legibility import From, Node, PrefixScore, goal_legibility
 from legible_envs.observer import ObserverModel
 from legible_envs.overcooked.grid import NEIGHBOURS
 from legible_envs.overcooked.layout import FLOOR, OvercookedLayout
+from legible_envs.overcooked.reach import Reach, reach_of
 from legible_envs.overcooked.recipes import soup_task
 from legible_envs.overcooked.scoring.boltzmann import (
     BoltzmannTrajectories,
@@ -28,31 +32,40 @@ from legible_envs.overcooked.scoring.boltzmann import (
     boltzmann_legibility,
     boltzmann_trajectories,
 )
+from legible_envs.support.validation import shown
 from legible_envs.tasks import TaskGraph
 
 __all__ = ["ambiguity", "explain_layout", "grid_graph", "layout_distance", "score_layout"]
 
 
 def grid_graph(
-    layout: OvercookedLayout, cell_costs: npt.NDArray[np.float64] | None = None
+    layout: OvercookedLayout, cell_costs: npt.NDArray[np.float64] | None = None, *, reach: Reach | None = None
 ) -> dict[Node, dict[Node, float]]:
     """The kitchen as a graph for :mod:`legible_envs.legibility`.
 
     Nodes are floor cells ``(row, col)``, every station by name as somewhere to arrive, and ``From(name)`` as somewhere
     to leave. Stepping on a cell costs what ``cell_costs`` says (1 by default), arriving at a station 1.
+
+    Args:
+        layout: The kitchen.
+        cell_costs: ``(H, W)`` cost of stepping on each cell; None for 1.
+        reach: Only floor and stations in a person's reach; None for all.
     """
+    floor = layout.cells == FLOOR if reach is None else reach.floor
+    stations = layout.stations if reach is None else reach.stations
 
     def cost(cell: tuple[int, int]) -> float:
         return 1.0 if cell_costs is None else float(cell_costs[cell])
 
     graph: dict[Node, dict[Node, float]] = {}
-    for row, col in np.argwhere(layout.cells == 0).tolist():
+    for row, col in np.argwhere(floor).tolist():
         around = [(row + dr, col + dc) for dr, dc in NEIGHBOURS]
         graph[row, col] = {cell: cost(cell) for cell in around if layout.is_floor(cell)}
-    for name in layout.stations:
+    for name in stations:
+        access = layout.access(name) if reach is None else reach.access(name)
         graph[name] = {}
-        graph[From(name)] = {cell: cost(cell) for cell in layout.access(name)}
-        for cell in layout.access(name):
+        graph[From(name)] = {cell: cost(cell) for cell in access}
+        for cell in access:
             graph[cell][name] = 1.0
     return graph
 
@@ -74,42 +87,65 @@ def _stage_goals(
     observer: ObserverModel,
     human: HumanModel | HumanName,
     cell_costs: npt.NDArray[np.float64] | None,
+    player: int,
 ) -> Iterator[_StageGoal]:
-    """Every stage of the task with each of its goals, scored by the readable definition."""
+    """Every stage of the task with each of its goals in a player's reach, scored by the readable definition."""
+    reach = reach_of(layout, player)
+    reach.check_task(task)
+    if not isinstance(observer, ObserverModel):
+        raise ValueError(f"`observer` must be an ObserverModel, got {shown(observer)}")
     human = human_model(layout, human)
-    graph = grid_graph(layout, cell_costs)
+    graph = grid_graph(layout, _checked_costs(reach, cell_costs, observer.tie_tolerance), reach=reach)
     followed: dict[tuple[str, str], BoltzmannTrajectories] = {}
     for stage in task.stages():
-        starts = _instances(layout, stage.start)
-        goals = tuple(name for kind in stage.goals for name in _instances(layout, kind))
+        starts = reach.named(stage.start)
+        goals = tuple(name for kind in stage.goals for name in reach.named(kind))
         for start in starts:
             for goal in goals:
                 truncated = 0.0
-                try:
-                    if human.rationality is None or human.horizon is None:
-                        scores = goal_legibility(graph, From(start), goal, goals, observer)
-                    else:
-                        if (start, goal) not in followed:
-                            followed[start, goal] = boltzmann_trajectories(
-                                graph,
-                                From(start),
-                                goal,
-                                rationality=human.rationality,
-                                horizon=human.horizon,
-                                prefix=observer.prefix,
-                            )
-                        truncated = followed[start, goal].truncated_probability
-                        scores = boltzmann_legibility(graph, From(start), goals, followed[start, goal], observer)
-                except ValueError as error:
-                    raise LayoutError(f"the task cannot be done in this kitchen: {error}", rule="reachable") from error
+                if human.rationality is None or human.horizon is None:
+                    scores = goal_legibility(graph, From(start), goal, goals, observer)
+                else:
+                    if (start, goal) not in followed:
+                        followed[start, goal] = boltzmann_trajectories(
+                            graph,
+                            From(start),
+                            goal,
+                            rationality=human.rationality,
+                            horizon=human.horizon,
+                            prefix=observer.prefix,
+                        )
+                    truncated = followed[start, goal].truncated_probability
+                    scores = boltzmann_legibility(graph, From(start), goals, followed[start, goal], observer)
                 yield _StageGoal(start, goals, goal, stage.weight / len(starts), scores, truncated)
 
 
-def _instances(layout: OvercookedLayout, kind: str) -> tuple[str, ...]:
-    names = (kind,) if kind in layout.stations else layout.named(kind)
-    if not names:
-        raise LayoutError(f"the task needs a {kind} station; the kitchen has {list(layout.stations)}", rule="station")
-    return names
+def _checked_costs(
+    reach: Reach, cell_costs: npt.NDArray[np.float64] | None, tie_tolerance: float
+) -> npt.NDArray[np.float64] | None:
+    """``(H, W)`` costs of stepping on cells, those of the floor in reach finite and greater than what counts as a tie.
+
+    Raises:
+        ValueError: No numbers, another shape, or a cost out of range (naming the cell).
+    """
+    if cell_costs is None:
+        return None
+    shape = reach.layout.shape
+    try:
+        costs = np.array(cell_costs, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ValueError(f"`cell_costs` must be an array of numbers of shape {shape}: {error}") from error
+    if costs.shape != shape:
+        raise ValueError(f"`cell_costs` must have the kitchen's shape {shape}, got {costs.shape}")
+    least = max(1e-6, 2 * tie_tolerance)
+    wrong = np.argwhere(reach.floor & ~(np.isfinite(costs) & (costs >= least)))
+    if len(wrong):
+        row, col = wrong[0]
+        raise ValueError(
+            f"`cell_costs` of floor cells must be finite and at least {least:g}; row {row}, column {col} is "
+            f"{costs[row, col]}"
+        )
+    return costs
 
 
 def human_model(layout: OvercookedLayout, human: HumanModel | HumanName) -> HumanModel:
@@ -122,29 +158,30 @@ def human_model(layout: OvercookedLayout, human: HumanModel | HumanName) -> Huma
     return human.within(int(np.count_nonzero(layout.cells == FLOOR)))
 
 
-def layout_distance(layout: OvercookedLayout, task: TaskGraph) -> float:
+def layout_distance(layout: OvercookedLayout, task: TaskGraph, *, player: int = 1) -> float:
     """Expected number of floor moves of one task execution in a uniformly random valid sequence.
 
     Where a type repeats: a goal is any of its stations, equally likely; every other stop is the nearest of its type.
 
+    Args:
+        layout: The kitchen.
+        task: The task, over station types.
+        player: Whose distance; stations out of this player's reach do not count.
+
     Raises:
-        LayoutError: A station the task needs is missing or cannot be reached.
+        LayoutError: A station the task needs is missing or out of the player's reach, or there is no such player.
     """
+    reach = reach_of(layout, player)
+    reach.check_task(task)
     goals = set(task.goals)
     total = []
     for (a, b), expected in task.legs().items():
         moves = []
-        for start in _instances(layout, a):
-            field = layout.distances_from(layout.access(start))
-            reached = [
-                min((int(field[cell]) for cell in layout.access(name) if field[cell] >= 0), default=math.inf)
-                for name in _instances(layout, b)
-            ]
+        for start in reach.named(a):
+            field = layout.distances_from(reach.access(start))
+            reached = [min(int(field[cell]) for cell in reach.access(name)) for name in reach.named(b)]
             moves.append(sum(reached) / len(reached) if b in goals else min(reached))
-        leg = sum(moves) / len(moves)
-        if math.isinf(leg):
-            raise LayoutError(f"the task cannot be done in this kitchen: no path from {a} to {b}", rule="reachable")
-        total.append(expected * leg)
+        total.append(expected * (sum(moves) / len(moves)))
     return math.fsum(total)
 
 
@@ -155,6 +192,7 @@ def score_layout(
     observer: ObserverModel = ObserverModel(),
     human: HumanModel | HumanName = "shortest",
     cell_costs: npt.NDArray[np.float64] | None = None,
+    player: int = 1,
 ) -> dict[str, Any]:
     """Score any kitchen.
 
@@ -164,23 +202,26 @@ def score_layout(
         observer: How the observer infers goals, which prefixes count, and what errors cost.
         human: How people move: a model, or ``"shortest"`` or ``"boltzmann"`` with its default settings.
         cell_costs: ``(H, W)`` cost of stepping on each cell, for people and observer alike; None for 1.
+        player: Number of the player whose score it is, from 1; what is out of their reach is no goal.
 
     Returns:
         ``score`` (Eq. 3 per sequence); ``distance`` (floor moves per execution); ``normalised``, the score over the
         expected number of (stage, goal) pairs, at most 1 for ``prefix="mean"``; ``single_goal_share``, the part of the
         score that comes from stages with one valid goal, and ``single_goal_score``; ``num_obstacles``;
         ``candidate_set`` (``"task"``: valid by precedence); ``num_sequences``; ``num_stages``; ``layout_id``;
-        ``human``. For ``"boltzmann"`` also ``rationality``, ``horizon``, ``truncated_probability`` (that a trajectory
-        of the task does not arrive within the horizon; the score is that of those that do) and
-        ``largest_truncated_probability`` of all starts and goals.
+        ``human``; ``player``; ``out_of_reach``, the names of the stations that were left out. For ``"boltzmann"`` also
+        ``rationality``, ``horizon``, ``truncated_probability`` (that a trajectory of the task does not arrive within
+        the horizon; the score is that of those that do) and ``largest_truncated_probability`` of all starts and goals.
 
     Raises:
-        LayoutError: A station the task needs is missing or cannot be reached.
+        LayoutError: A station the task needs is missing or out of the player's reach, or there is no such player.
+        ValueError: Costs of another shape, or not finite and greater than 0 on the floor.
     """
     task = task or soup_task()
+    reach = reach_of(layout, player)
     human = human_model(layout, human)
     parts, single, pairs, truncated = [], [], [], []
-    for part in _stage_goals(layout, task, observer, human, cell_costs):
+    for part in _stage_goals(layout, task, observer, human, cell_costs, player):
         value = part.weight * math.fsum(s.probability * s.weight * s.value for s in part.scores)
         parts.append(value)
         pairs.append(part.weight)
@@ -190,7 +231,7 @@ def score_layout(
     score = math.fsum(parts)
     result = {
         "score": score,
-        "distance": layout_distance(layout, task),
+        "distance": layout_distance(layout, task, player=player),
         "normalised": score / math.fsum(pairs),
         "single_goal_score": math.fsum(single),
         "single_goal_share": math.fsum(single) / score if score else math.nan,
@@ -200,6 +241,8 @@ def score_layout(
         "num_stages": len(task.stages()),
         "layout_id": layout.layout_id,
         "human": human.name,
+        "player": reach.player,
+        "out_of_reach": list(reach.out_of_reach),
     }
     if human.name == "boltzmann":
         result["rationality"], result["horizon"] = human.rationality, human.horizon
@@ -217,6 +260,7 @@ def explain_layout(
     observer: ObserverModel = ObserverModel(),
     human: HumanModel | HumanName = "shortest",
     cell_costs: npt.NDArray[np.float64] | None = None,
+    player: int = 1,
 ) -> list[dict[str, Any]]:
     """Which stages, goals and prefixes win or lose the score of a kitchen.
 
@@ -226,6 +270,7 @@ def explain_layout(
         observer: How the observer infers goals, which prefixes count, and what errors cost.
         human: How people move: a model, or ``"shortest"`` or ``"boltzmann"`` with its default settings.
         cell_costs: ``(H, W)`` cost of stepping on each cell, for people and observer alike; None for 1.
+        player: Number of the player whose score it is, from 1; what is out of their reach is no goal.
 
     Returns:
         A row for every stage and goal, the greatest loss first: ``start``, ``goals`` (valid), ``goal`` (true),
@@ -237,10 +282,11 @@ def explain_layout(
         of Eq. 2, its ``weight`` and ``ties_with`` at that step.
 
     Raises:
-        LayoutError: A station the task needs is missing or cannot be reached.
+        LayoutError: A station the task needs is missing or out of the player's reach, or there is no such player.
     """
     rows = []
-    for start, goals, goal, weight, scores, _ in _stage_goals(layout, task or soup_task(), observer, human, cell_costs):
+    parts = _stage_goals(layout, task or soup_task(), observer, human, cell_costs, player)
+    for start, goals, goal, weight, scores, _ in parts:
         score = math.fsum(s.probability * s.weight * s.value for s in scores)
         rows.append(
             {
@@ -302,6 +348,7 @@ def ambiguity(
     observer: ObserverModel = ObserverModel(),
     human: HumanModel | HumanName = "shortest",
     cell_costs: npt.NDArray[np.float64] | None = None,
+    player: int = 1,
 ) -> npt.NDArray[np.float64]:
     """How often an observer who sees the person on a cell would predict a wrong goal.
 
@@ -313,16 +360,18 @@ def ambiguity(
         observer: How the observer infers goals, which prefixes count, and what errors cost.
         human: How people move: a model, or ``"shortest"`` or ``"boltzmann"`` with its default settings.
         cell_costs: ``(H, W)`` cost of stepping on each cell, for people and observer alike; None for 1.
+        player: Number of the player whose score it is, from 1; what is out of their reach is no goal.
 
     Returns:
-        ``(H, W)`` probabilities; NaN on cells that no trajectory passes.
+        ``(H, W)`` probabilities; NaN on cells that no trajectory of this player passes.
 
     Raises:
-        LayoutError: A station the task needs is missing or cannot be reached.
+        LayoutError: A station the task needs is missing or out of the player's reach, or there is no such player.
     """
     wrong = np.zeros(layout.shape)
     visits = np.zeros(layout.shape)
-    for _, goals, goal, weight, scores, _ in _stage_goals(layout, task or soup_task(), observer, human, cell_costs):
+    parts = _stage_goals(layout, task or soup_task(), observer, human, cell_costs, player)
+    for _, goals, goal, weight, scores, _ in parts:
         for s in scores:
             cell = cast("tuple[int, int]", s.node)
             visits[cell] += weight / len(goals) * s.probability
