@@ -1,10 +1,12 @@
 from .design.workspace import OvercookedWorkspace
+from .kitchen_file import KitchenFile
 from .layout import OvercookedLayout
 from .recipes import PAPER_SOUPS, soup_task
 from .scoring.scorer import OvercookedScorer
 
 __all__ = [
     "PAPER_SOUPS",
+    "KitchenFile",
     "OvercookedLayout",
     "OvercookedScorer",
     "OvercookedWorkspace",
