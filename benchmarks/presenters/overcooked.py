@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import click
@@ -23,6 +24,7 @@ from benchmarks.presenters.base import (
 )
 from benchmarks.presenters.registry import load_design
 from legible_envs.errors import LayoutError
+from legible_envs.overcooked.kitchen_file import KitchenFile
 from legible_envs.overcooked.layout import OvercookedLayout
 
 if TYPE_CHECKING:
@@ -39,11 +41,18 @@ if TYPE_CHECKING:
 __all__ = ["Kitchen", "KitchenPresenter", "kitchen_from", "load_kitchen", "panels_text"]
 
 
+@dataclass(frozen=True)
 class Kitchen(Design):
-    """A kitchen named on the command line; ``settings`` are ``prefix`` and ``pots``."""
+    """A kitchen named on the command line; ``settings`` are ``prefix`` and ``pots``.
+
+    Attributes:
+        file: What the file says that it was read from, or None.
+    """
 
     noun: ClassVar[str] = "kitchen"
     picture: ClassVar[str] = "where goals are confused"
+
+    file: KitchenFile | None = None
 
     def _summary_outside(self) -> dict[str, Any]:
         return self._scorer.score_layout(self.layout)
@@ -71,6 +80,8 @@ class Kitchen(Design):
         """The soups that the scored task cooks."""
         if self.genome is not None:
             return tuple(self.workspace.recipes)
+        if self.file is not None and self.file.recipes is not None:
+            return self.file.recipes
         from legible_envs.overcooked.human_play import recipes_for
 
         return recipes_for(self.layout)
@@ -89,8 +100,19 @@ class Kitchen(Design):
             ("candidate set", summary["candidate_set"]),
             ("sequences", f"{summary['num_sequences']:,}"),
             ("layout id", summary["layout_id"]),
+            *self._notes(),
             *([("design rules", f"outside: {self.broken_rule}")] if self.broken_rule else []),
         ]
+
+    def _notes(self) -> list[tuple[str, str]]:
+        """In which form the file was, where that is not plain, and which of its orders are left out."""
+        if self.file is None:
+            return []
+        notes = [] if self.file.form == "drawing" else [("read as", self.file.form)]
+        if self.file.left_out:
+            soups = "; ".join(" + ".join(soup) for soup in self.file.left_out)
+            notes.append(("left out", f"{soups} (ordered too, but part of another order, where a pot goes on)"))
+        return notes
 
     def text(self, console: Console) -> RenderableType:
         """The kitchen in the characters that this console can show."""
@@ -129,25 +151,25 @@ def load_kitchen(source: str, *, prefix: Any = None, pots: int | None = None) ->
 
 
 def kitchen_from(text: str, name: str, asked: Mapping[str, Any]) -> Kitchen:
-    """A kitchen from its drawing or an Overcooked-AI ``.layout`` file.
+    """A kitchen from the text of a file in any form that :class:`.KitchenFile` reads, with the orders in it.
 
     Raises:
-        LayoutError: The drawing is malformed; the message names row, column and rule.
+        LayoutError: The text is malformed; the message names row, column and rule.
     """
     from legible_envs.workspace import make_workspace
 
     refuse(asked, "task", "kitchen")
     try:
-        is_foreign = text.lstrip().startswith("{") or name.endswith(".layout")
-        layout = OvercookedLayout.from_overcooked_ai(text) if is_foreign else OvercookedLayout.from_ascii(text)
+        file = KitchenFile.from_text(text)
     except LayoutError as error:
         raise LayoutError(f"{name}: {error}", rule=error.rule, cell=error.cell) from error
     try:
-        workspace = make_workspace("overcooked", shape=layout.shape, **asked)
+        orders = {} if file.recipes is None else {"recipes": file.recipes}
+        workspace = make_workspace("overcooked", shape=file.layout.shape, **orders, **asked)
     except LayoutError as error:
-        return Kitchen(layout, None, None, str(error), dict(asked))
-    genome, broken_rule = as_genome(workspace, layout)
-    return Kitchen(layout, None if genome is None else workspace, genome, broken_rule, dict(asked))
+        return Kitchen(file.layout, None, None, str(error), dict(asked), file)
+    genome, broken_rule = as_genome(workspace, file.layout)
+    return Kitchen(file.layout, None if genome is None else workspace, genome, broken_rule, dict(asked), file)
 
 
 class KitchenPresenter(Presenter):
@@ -174,14 +196,17 @@ class KitchenPresenter(Presenter):
         return True
 
     def read_design(self, text: str, name: str, asked: Mapping[str, Any]) -> Kitchen:
-        """A kitchen from its drawing or an Overcooked-AI ``.layout`` file."""
+        """A kitchen from the text of a file; see :func:`kitchen_from`."""
         return kitchen_from(text, name, asked)
 
     def design(self, settings: Mapping[str, Any]) -> dict[str, Any]:
         """Shape, prefix, pots, and the kitchen to start from."""
         found = {key: settings[key] for key in ("shape", "prefix", "pots") if settings.get(key) is not None}
         if settings.get("start_from") is not None:
-            kitchen = load_kitchen(settings["start_from"]).layout
+            named = load_kitchen(settings["start_from"])
+            kitchen = named.layout
+            if named.file is not None and named.file.recipes is not None:
+                found["recipes"] = [list(soup) for soup in named.file.recipes]
             found |= {"shape": kitchen.shape, "start_from": kitchen.to_ascii()}
             found |= {"relocation_cost": settings.get("relocation_cost", 0.0), "locked": list(settings.get("lock", ()))}
         elif settings.get("lock") or settings.get("relocation_cost"):

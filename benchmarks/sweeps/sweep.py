@@ -12,6 +12,7 @@ from typing import Any, Final, NamedTuple, get_args
 
 import numpy as np
 
+from legible_envs.support.text import read_text
 from legible_envs.workspace import ObjectiveName, Workspace, make_workspace
 from predictors.registry import make_predictor
 
@@ -85,8 +86,8 @@ class Sweep:
         """
         path = Path(path)
         try:
-            data = tomllib.loads(path.read_text(encoding="utf-8"))
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            data = tomllib.loads(read_text(path))
+        except ValueError as error:
             raise SweepError(f"{path} is not TOML: {error}") from error
         try:
             return cls.from_dict({"name": path.stem} | data)
