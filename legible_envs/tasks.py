@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from legible_envs.errors import TaskError
+from legible_envs.support.text import clean_text, read_text
 from legible_envs.support.validation import entries, integer, shown
 from legible_envs.task_states import StateSpace, SubtaskClass
 
@@ -349,7 +350,10 @@ class TaskGraph:
         import yaml
 
         is_file = isinstance(source, Path) or ("\n" not in source and source.endswith((".yaml", ".yml")))
-        text = Path(source).read_text(encoding="utf-8") if is_file else str(source)
+        try:
+            text = read_text(source) if is_file else clean_text(str(source))
+        except ValueError as error:  # no text; names the file
+            raise TaskError(str(error)) from error
         try:
             data = yaml.safe_load(text)
         except yaml.YAMLError as error:

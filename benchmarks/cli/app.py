@@ -296,7 +296,8 @@ def play(layout: str, fps: int, record: Path | None) -> None:
     from benchmarks.presenters.overcooked import load_kitchen
     from legible_envs.overcooked.human_play import play as play_layout
 
-    played = play_layout(load_kitchen(layout).layout, fps=fps, record=record)
+    kitchen = load_kitchen(layout)
+    played = play_layout(kitchen.layout, recipes=kitchen.soups, fps=fps, record=record)
     click.echo(f"{plural(len(played.actions), 'step')}, reward {played.rewards.sum():g}")
     if record is not None and len(played.actions):
         click.echo(f"recorded: {click.format_filename(record)}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 import click
@@ -24,6 +25,7 @@ from benchmarks.presenters.base import (
 from benchmarks.presenters.panels import median_of_random, panel_of, price_of
 from benchmarks.presenters.registry import load_design
 from legible_envs.errors import LayoutError
+from legible_envs.overcooked.kitchen_file import KitchenFile
 from legible_envs.overcooked.layout import OvercookedLayout
 
 if TYPE_CHECKING:
@@ -45,11 +47,18 @@ RANDOM_LAYOUTS: Final = 1_000
 """Random layouts whose median the best one is shown beside."""
 
 
+@dataclass(frozen=True)
 class Kitchen(Design):
-    """A kitchen named on the command line; ``settings`` are ``prefix``, ``pots`` and ``player``."""
+    """A kitchen named on the command line; ``settings`` are ``prefix``, ``pots`` and ``player``.
+
+    Attributes:
+        file: What the file says that it was read from, or None.
+    """
 
     noun: ClassVar[str] = "kitchen"
     picture: ClassVar[str] = "where goals are confused"
+
+    file: KitchenFile | None = None
 
     @property
     def player(self) -> int:
@@ -86,6 +95,8 @@ class Kitchen(Design):
         """The soups that the scored task cooks."""
         if self.genome is not None:
             return tuple(self.workspace.recipes)
+        if self.file is not None and self.file.recipes is not None:
+            return self.file.recipes
         from legible_envs.overcooked.human_play import recipes_for
 
         return recipes_for(self.layout, self.player)
@@ -106,8 +117,19 @@ class Kitchen(Design):
             ("layout id", summary["layout_id"]),
             *([("player", str(self.player))] if "player" in self.settings or summary["out_of_reach"] else []),
             *([("out of reach", ", ".join(summary["out_of_reach"]))] if summary["out_of_reach"] else []),
+            *self._notes(),
             *([("design rules", f"outside: {self.broken_rule}")] if self.broken_rule else []),
         ]
+
+    def _notes(self) -> list[tuple[str, str]]:
+        """In which form the file was, where that is not plain, and which of its orders are left out."""
+        if self.file is None:
+            return []
+        notes = [] if self.file.form == "drawing" else [("read as", self.file.form)]
+        if self.file.left_out:
+            soups = "; ".join(" + ".join(soup) for soup in self.file.left_out)
+            notes.append(("left out", f"{soups} (ordered too, but part of another order, where a pot goes on)"))
+        return notes
 
     def text(self, console: Console) -> RenderableType:
         """The kitchen in the characters that this console can show."""
@@ -147,26 +169,26 @@ def load_kitchen(source: str, *, prefix: Any = None, pots: int | None = None, pl
 
 
 def kitchen_from(text: str, name: str, asked: Mapping[str, Any]) -> Kitchen:
-    """A kitchen from its drawing or an Overcooked-AI ``.layout`` file.
+    """A kitchen from the text of a file in any form that :class:`.KitchenFile` reads, with the orders in it.
 
     Raises:
-        LayoutError: The drawing is malformed; the message names row, column and rule.
+        LayoutError: The text is malformed; the message names row, column and rule.
     """
     from legible_envs.workspace import make_workspace
 
     refuse(asked, "task", "kitchen")
     of_score = {key: value for key, value in asked.items() if key != "player"}
     try:
-        is_foreign = text.lstrip().startswith("{") or name.endswith(".layout")
-        layout = OvercookedLayout.from_overcooked_ai(text) if is_foreign else OvercookedLayout.from_ascii(text)
+        file = KitchenFile.from_text(text)
     except LayoutError as error:
         raise LayoutError(f"{name}: {error}", rule=error.rule, cell=error.cell) from error
     try:
-        workspace = make_workspace("overcooked", shape=layout.shape, **of_score)
+        orders = {} if file.recipes is None else {"recipes": file.recipes}
+        workspace = make_workspace("overcooked", shape=file.layout.shape, **orders, **of_score)
     except LayoutError as error:
-        return Kitchen(layout, None, None, str(error), dict(asked))
-    genome, broken_rule = as_genome(workspace, layout)
-    return Kitchen(layout, None if genome is None else workspace, genome, broken_rule, dict(asked))
+        return Kitchen(file.layout, None, None, str(error), dict(asked), file)
+    genome, broken_rule = as_genome(workspace, file.layout)
+    return Kitchen(file.layout, None if genome is None else workspace, genome, broken_rule, dict(asked), file)
 
 
 class KitchenPresenter(Presenter):
@@ -194,14 +216,17 @@ class KitchenPresenter(Presenter):
         return True
 
     def read_design(self, text: str, name: str, asked: Mapping[str, Any]) -> Kitchen:
-        """A kitchen from its drawing or an Overcooked-AI ``.layout`` file."""
+        """A kitchen from the text of a file; see :func:`kitchen_from`."""
         return kitchen_from(text, name, asked)
 
     def design(self, settings: Mapping[str, Any]) -> dict[str, Any]:
         """Shape, prefix, pots, and the kitchen to start from."""
         found = {key: settings[key] for key in ("shape", "prefix", "pots") if settings.get(key) is not None}
         if settings.get("start_from") is not None:
-            kitchen = load_kitchen(settings["start_from"]).layout
+            named = load_kitchen(settings["start_from"])
+            kitchen = named.layout
+            if named.file is not None and named.file.recipes is not None:
+                found["recipes"] = [list(soup) for soup in named.file.recipes]
             found |= {"shape": kitchen.shape, "start_from": kitchen.to_ascii()}
             found |= {"relocation_cost": settings.get("relocation_cost", 0.0), "locked": list(settings.get("lock", ()))}
         elif settings.get("lock") or settings.get("relocation_cost"):

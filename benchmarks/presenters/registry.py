@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 from benchmarks.presenters.base import Design, Presenter
 from legible_envs.errors import LayoutError
 from legible_envs.support.plugins import Registry
+from legible_envs.support.text import clean_text, decode_text, read_text
 from legible_envs.workspace import workspace_class
 from optimizers.errors import SearchError
 from optimizers.runs.folder import is_run_folder
@@ -169,7 +170,9 @@ def read_source(source: str) -> tuple[str, str]:
     if source != "-" and Path(source).is_dir():
         raise LayoutError(f"{source} is a folder without a config.json: neither a run nor a layout", rule="type")
     try:
-        text = sys.stdin.read() if source == "-" else Path(source).read_text(encoding="utf-8")
-    except UnicodeDecodeError as error:
-        raise LayoutError(f"{source} is not a text file; expected the text of a layout", rule="type") from error
-    return "standard input" if source == "-" else source, text
+        if source != "-":
+            return source, read_text(source)
+        name, data = "standard input", getattr(sys.stdin, "buffer", sys.stdin).read()
+        return name, decode_text(data, name) if isinstance(data, bytes) else clean_text(data)
+    except ValueError as error:
+        raise LayoutError(f"{error}; expected the text of a layout", rule="type") from error

@@ -27,6 +27,7 @@ from benchmarks.presenters.panels import price_of
 from benchmarks.presenters.registry import load_design, read_source
 from benchmarks.presenters.tabletop_panels import CONDITIONS, LIST, beta_of, listed, panels_of, write_panels
 from legible_envs.errors import LayoutError
+from legible_envs.overcooked.layout_kind import is_kitchen
 from legible_envs.support.files import write_text
 from legible_envs.tabletop import TabletopLayout, TabletopTask
 from optimizers.runs.folder import is_run_folder
@@ -162,9 +163,11 @@ class TableDesign(Design):
 
 def is_table(text: str, source: str) -> bool:
     """Whether a text is meant as the JSON of a table."""
+    if text.lstrip().startswith(("{", "[")) and is_kitchen(text):
+        return False
     try:
         data = json.loads(text)
-    except ValueError:
+    except (ValueError, RecursionError):
         return source.endswith(".json")
     return isinstance(data, dict)
 

@@ -1,4 +1,5 @@
 from .design.workspace import OvercookedWorkspace
+from .kitchen_file import KitchenFile
 from .layout import OvercookedLayout
 from .reach import Reach, reach_of
 from .recipes import PAPER_SOUPS, soup_task
@@ -6,6 +7,7 @@ from .scoring.scorer import OvercookedScorer
 
 __all__ = [
     "PAPER_SOUPS",
+    "KitchenFile",
     "OvercookedLayout",
     "OvercookedScorer",
     "OvercookedWorkspace",

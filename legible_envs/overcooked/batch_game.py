@@ -101,6 +101,6 @@ class GameOfBatch:
         return draw_game(self.view())
 
     def __getattr__(self, name: str) -> Any:
-        if name in ("settings", "render_mode", "metadata"):
+        if name in ("settings", "shape", "render_mode", "metadata"):
             return getattr(self._envs, name)
         raise AttributeError(f"the games of a batch have no attribute {name!r}")

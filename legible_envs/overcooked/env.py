@@ -18,7 +18,6 @@ from legible_envs.overcooked.game.vectors import CROSSINGS, DELIVERIES, STATE_SI
 from legible_envs.overcooked.game.view import GameView
 from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.overcooked.layouts import read_layout
-from legible_envs.overcooked.recipes import PAPER_SOUPS
 from legible_envs.overcooked.rendering.board import draw_small
 from legible_envs.overcooked.settings import KitchenSettings, PackedKitchen
 from legible_envs.overcooked.trajectories import trajectories_from_states
@@ -133,15 +132,17 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
     ## Arguments
 
     Args:
-        shape: Rows and columns of all kitchens of this environment, 3 to 64 each.
-        layout: The kitchen: an ASCII drawing, a list of row strings or nested lists of symbols (these keep the
-            environment's spec JSON), an `OvercookedLayout`, a 2-D array of cell codes, or a genome of
-            `OvercookedWorkspace(shape)`.
+        shape: Rows and columns of all kitchens of this environment, 3 to 64 each. None: those of `layout` or
+            `layouts`, else 7 and 7.
+        layout: The kitchen: an ASCII drawing, or the text of a layout file in any form that `KitchenFile` reads (never
+            a file's name: `KitchenFile.read(path)` reads one); a `KitchenFile`, or the entries of one; a list of row
+            strings or nested lists of symbols; an `OvercookedLayout`; a 2-D array of cell codes; or a genome of
+            `OvercookedWorkspace(shape)`. The environment's spec stays JSON.
         layouts: A distribution to draw a kitchen from at every reset: `"random"`, `"random:train"`, `"random:test"`, a
             mapping such as `{"kind": "random", "split": "train", "num_layouts": 200}` with arguments of
             `RandomLayouts`, a list of kitchens, or any object with `sample(rng)`.
         recipes: The ordered soups, each a sequence of ingredients (`tomato`, `onion`, `cabbage`, `fish`), each cooked
-            and delivered once.
+            and delivered once. `"own"`: those of the file that `layout` is, where it orders any, else the paper's.
         cook_time: Ticks a soup cooks.
         obs_type: `"grid"`, `"vector"` or `"rgb"`.
         virtual_obstacles: `"hard"`: they block the player; `"soft"`: they can be crossed, and crossings are counted.
@@ -165,10 +166,10 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
     def __init__(
         self,
         *,
-        shape: Sequence[int] = (7, 7),
+        shape: Sequence[int] | None = None,
         layout: Any = None,
         layouts: Any = None,
-        recipes: Sequence[Sequence[str]] = PAPER_SOUPS,
+        recipes: Sequence[Sequence[str]] | Literal["own"] = "own",
         cook_time: int = 20,
         obs_type: str = "grid",
         virtual_obstacles: str = "hard",
@@ -274,6 +275,11 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
     def render(self) -> Any:
         """See :meth:`.Rendered.render`; with ``"ansi"``, the game drawn in text."""
         return to_text(self.view()) if self.render_mode == "ansi" else super().render()
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of all kitchens of this environment."""
+        return self.settings.shape
 
     # -- kitchens -----------------------------------------------------------------------------------------------------
 

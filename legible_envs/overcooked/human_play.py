@@ -18,12 +18,14 @@ import numpy.typing as npt
 from legible_envs.drawing.window import open_screen, room_for_a_window
 from legible_envs.overcooked.game.vectors import INTERACT, STAY
 from legible_envs.overcooked.layout import INGREDIENTS, OvercookedLayout
+from legible_envs.overcooked.layouts import read_kitchen
 from legible_envs.overcooked.reach import reach_of
 from legible_envs.overcooked.recipes import PAPER_SOUPS, Recipe, check_recipes
 from legible_envs.support.files import write_npz
 from legible_envs.support.validation import real
 
 if TYPE_CHECKING:
+    from legible_envs.overcooked.kitchen_file import KitchenFile
     from legible_envs.rollouts.trajectory import Trajectory
 
 __all__ = ["Played", "load_played", "play", "read_played", "recipes_for", "tile_for", "trajectories_from_played"]
@@ -189,7 +191,7 @@ def _kind(name: str) -> str:
 
 
 def play(
-    layout: OvercookedLayout | str | Sequence[str],
+    layout: OvercookedLayout | KitchenFile | str | Sequence[str],
     *,
     recipes: Sequence[Sequence[str]] | None = None,
     fps: int = 8,
@@ -205,8 +207,8 @@ def play(
     interacting happens once per tap.
 
     Args:
-        layout: The kitchen; also a drawing or a list of rows.
-        recipes: The ordered soups; None takes those of :func:`recipes_for`.
+        layout: The kitchen; also a drawing, a list of rows, or a :class:`.KitchenFile`.
+        recipes: The ordered soups; None takes those that the kitchen's file orders, else those of :func:`recipes_for`.
         fps: Steps per second.
         record: Where to write the actions (``.npz``), also when the window is closed or the game is
             interrupted; not written if no step was played.
@@ -224,11 +226,9 @@ def play(
         ValueError: A bad number of steps per second.
     """
     real("fps", fps, 1, _POLLS_PER_SECOND, unit="steps per second")
-    if isinstance(layout, str):
-        layout = OvercookedLayout.from_ascii(layout)
-    elif not isinstance(layout, OvercookedLayout):
-        layout = OvercookedLayout.from_rows(layout)
-    soups = check_recipes(recipes_for(layout) if recipes is None else recipes)
+    kitchen = read_kitchen(layout, orders=recipes is None)
+    layout = kitchen.layout
+    soups = check_recipes(recipes if recipes is not None else kitchen.recipes or recipes_for(layout))
     setting = Played(layout, soups, virtual_obstacles, seed)
     if record is not None:
         _check_writable(Path(record))

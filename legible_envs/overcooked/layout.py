@@ -2,17 +2,34 @@
 
 from __future__ import annotations
 
-import ast
 import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
-from typing import Any, Final
+from typing import Any, TypeGuard
 
 import numpy as np
 import numpy.typing as npt
 
 from legible_envs.errors import LayoutError
+from legible_envs.overcooked.drawings import (
+    COUNTER,
+    FLOOR,
+    INGREDIENTS,
+    MAX_SIDE,
+    OBSTACLE,
+    STATION_CODES,
+    STATION_TYPES,
+    SYMBOLS,
+    draw,
+    read_indices,
+    read_jaxmarl_rows,
+    read_rows,
+    rows_of,
+    trim,
+)
 from legible_envs.overcooked.grid import NEIGHBOURS, Cell
+from legible_envs.support.literals import read_literal
+from legible_envs.support.text import clean_text
 from legible_envs.support.validation import entries, integer, shown
 
 __all__ = [
@@ -26,19 +43,6 @@ __all__ = [
     "OvercookedLayout",
     "check_shape",
 ]
-
-FLOOR: Final = 0
-COUNTER: Final = 1
-OBSTACLE: Final = 2
-STATION_TYPES: Final = ("tomato", "onion", "cabbage", "fish", "dish", "pot", "serving")
-INGREDIENTS: Final = STATION_TYPES[:4]
-STATION_CODES: Final[Mapping[str, int]] = {name: code for code, name in enumerate(STATION_TYPES, 3)}
-SYMBOLS: Final = " XVTOCFDPS"
-"""ASCII symbol of each cell code: floor, counter, virtual obstacle, then the stations in the order of STATION_TYPES."""
-
-_CODE_OF: Final = {symbol: code for code, symbol in enumerate(SYMBOLS)}
-_STRAY: Final = {".": " ", "_": " ", "#": "X"}
-MAX_SIDE: Final = 64
 
 
 def check_shape(shape: object, error: Callable[[str], Exception] = ValueError) -> tuple[int, int]:
@@ -57,6 +61,14 @@ def check_shape(shape: object, error: Callable[[str], Exception] = ValueError) -
     return rows, cols
 
 
+def _code_of(symbol: str) -> int:
+    return SYMBOLS.find(symbol) if len(symbol) == 1 else -1
+
+
+def _are_texts(rows: object) -> TypeGuard[Sequence[str]]:
+    return isinstance(rows, Sequence) and not isinstance(rows, str) and all(isinstance(row, str) for row in rows)
+
+
 class OvercookedLayout:
     """A kitchen: any rectangular grid of floor, counters, virtual obstacles and stations.
 
@@ -65,7 +77,8 @@ class OvercookedLayout:
     :class:`~legible_envs.overcooked.design.workspace.OvercookedWorkspace`.
 
     ASCII: ``X`` counter, space floor, ``V`` virtual obstacle, ``T O C F D P S`` tomato, onion, cabbage, fish, dish, pot
-    and serving stations, ``1`` to ``9`` the players' starts (floor underneath).
+    and serving stations, ``1`` to ``9`` the players' starts (floor underneath). Files of layouts in other forms, and
+    with orders, are read by :class:`~legible_envs.overcooked.kitchen_file.KitchenFile`.
 
     Args:
         cells: ``(H, W)`` cell codes: 0 floor, 1 counter, 2 virtual obstacle, 3.. stations in the order of
@@ -100,7 +113,8 @@ class OvercookedLayout:
         if bad.any():
             row, col = (int(i) for i in np.argwhere(bad)[0])
             raise LayoutError(
-                f"row {row}, column {col}: unknown cell code {array[row, col]!r}; expected 0..{len(SYMBOLS) - 1}",
+                f"row {row}, column {col}: unknown cell code {shown(array[row, col].item())}; "
+                f"expected 0..{len(SYMBOLS) - 1}",
                 rule="symbol",
                 cell=(row, col),
             )
@@ -137,88 +151,84 @@ class OvercookedLayout:
 
     @classmethod
     def from_ascii(cls, text: str) -> OvercookedLayout:
-        """Read a drawing, one line a row; blank lines before and after are dropped, common indentation is not.
+        """Read a drawing, one line a row.
+
+        A margin of blanks is no part of it: blank lines around the drawing, common indentation, and blanks beyond the
+        width of its longest row. Blanks up to that width are floor.
 
         Raises:
             LayoutError: Ragged rows or unknown symbols, naming row and column; whatever the constructor rejects.
         """
         if not isinstance(text, str):
             raise LayoutError(f"expected an ASCII drawing as a string, got {type(text).__name__}", rule="type")
-        return cls.from_rows([line.rstrip("\r") for line in text.strip("\r\n").split("\n")])
+        return cls(*read_rows(rows_of(text)))
 
     @classmethod
     def from_rows(cls, rows: Sequence[str | Sequence[str]]) -> OvercookedLayout:
-        """Read a list of row strings, or a nested list of one-character symbols; see :meth:`from_ascii`."""
-        lines = [list(row) for row in rows]
-        if not lines or not lines[0]:
-            raise LayoutError("the drawing is empty", rule="shape")
-        width = len(lines[0])
-        codes = np.zeros((len(lines), width), dtype=np.int8)
-        starts: dict[int, Cell] = {}
-        for r, line in enumerate(lines):
-            if len(line) != width:
-                raise LayoutError(
-                    f"ragged drawing: row {r} has {len(line)} cells, row 0 has {width}", rule="ragged", cell=(r, 0)
-                )
-            for c, symbol in enumerate(line):
-                if not isinstance(symbol, str):
-                    raise LayoutError(
-                        f"row {r}, column {c}: expected a one-character symbol, got {symbol!r}",
-                        rule="symbol",
-                        cell=(r, c),
-                    )
-                if symbol in _CODE_OF:
-                    codes[r, c] = _CODE_OF[symbol]
-                elif len(symbol) == 1 and symbol in "123456789":
-                    number = int(symbol)
-                    if number in starts:
-                        raise LayoutError(
-                            f"row {r}, column {c}: player {number} already starts at row {starts[number][0]}, "
-                            f"column {starts[number][1]}",
-                            rule="start",
-                            cell=(r, c),
-                        )
-                    starts[number] = (r, c)
-                else:
-                    hint = f" (did you mean {_STRAY[symbol]!r}?)" if symbol in _STRAY else ""
-                    raise LayoutError(
-                        f"row {r}, column {c}: unknown symbol {symbol!r}{hint}; "
-                        f"expected one of {SYMBOLS!r} or a player's digit",
-                        rule="symbol",
-                        cell=(r, c),
-                    )
-        if sorted(starts) != list(range(1, len(starts) + 1)):
-            raise LayoutError(f"players must be numbered 1, 2, …; the drawing has {sorted(starts)}", rule="start")
-        return cls(codes, [starts[number] for number in sorted(starts)])
+        """Read a list of row strings, as :meth:`from_ascii` does, or a nested list of one-character symbols."""
+        return cls(*read_rows(trim(rows) if _are_texts(rows) else rows))
 
     @classmethod
     def from_overcooked_ai(cls, source: str | Mapping[str, Any]) -> OvercookedLayout:
         """Read one of Overcooked-AI's layout files: the text of a ``.layout`` file, its dict, or the bare grid.
 
-        Only the grid is read; recipes, rewards and times in the file describe another game.
+        Only the grid is read, whatever else the file holds;
+        :class:`~legible_envs.overcooked.kitchen_file.KitchenFile` also reads the orders.
 
         Raises:
             LayoutError: The text is neither a grid nor a Python literal with a ``grid`` entry.
         """
-        if isinstance(source, str) and source.lstrip().startswith("{"):
+        if isinstance(source, str) and (text := clean_text(source)).lstrip().startswith("{"):
             try:
-                source = ast.literal_eval(source.strip())
-            except (ValueError, SyntaxError, MemoryError, RecursionError) as error:
+                source = read_literal(text)
+            except ValueError as error:
                 raise LayoutError(f"not an Overcooked-AI layout file: {error}", rule="type") from error
-        grid = source.get("grid") if isinstance(source, Mapping) else source
+        if isinstance(source, Mapping) and "grid" not in source:
+            raise LayoutError(
+                f"not an Overcooked-AI layout: it has no `grid`; its entries are {shown(sorted(map(str, source)))}",
+                rule="type",
+            )
+        grid = source["grid"] if isinstance(source, Mapping) else source
         if isinstance(grid, str):
             # These files indent every row but the first; no row of a kitchen starts with floor.
-            return cls.from_rows([line.strip() for line in grid.strip().split("\n")])
+            return cls.from_rows([line.strip() for line in clean_text(grid).strip().split("\n")])
         if isinstance(grid, Sequence):
             return cls.from_rows(grid)
-        raise LayoutError("not an Overcooked-AI layout: it has no `grid` text", rule="type")
+        raise LayoutError(f"the `grid` of an Overcooked-AI layout must be text or rows, got {shown(grid)}", rule="type")
+
+    @classmethod
+    def from_jaxmarl(cls, source: str | Sequence[str] | Mapping[str, Any]) -> OvercookedLayout:
+        r"""Read a kitchen of JaxMARL: a drawing (text or rows), or the dictionary of its cells' numbers.
+
+        In drawings ``W`` is a counter, ``A`` a player, ``X`` the place to deliver, ``B`` dishes, ``O`` onions and ``P``
+        a pot. Those of its second version number ingredients: ``0 1 2 3`` are read as onions, tomatoes, cabbages and
+        fish; what displays recipes there (``R L``) is a counter. In dictionaries ``wall_idx``, ``agent_idx``,
+        ``goal_idx``, ``plate_pile_idx``, ``onion_pile_idx`` and ``pot_idx`` list cells, numbered row by row.
+
+        Raises:
+            LayoutError: Unknown symbols or entries; names row and column, or the entry.
+
+        Example:
+            >>> print(OvercookedLayout.from_jaxmarl("WWPWW\nOA AO\nW   W\nWBWXW"))
+            XXPXX
+            O1 2O
+            X   X
+            XDXSX
+        """
+        if isinstance(source, Mapping):
+            return cls(*read_indices(source))
+        if not isinstance(source, str) and not _are_texts(source):
+            raise LayoutError(
+                f"expected a kitchen of JaxMARL as text, rows or a dict, got {shown(source)}", rule="type"
+            )
+        return cls(*read_jaxmarl_rows(rows_of(source) if isinstance(source, str) else trim(source)))
 
     def to_ascii(self) -> str:
-        """The drawing that :meth:`from_ascii` reads back to an equal layout."""
-        rows = [[SYMBOLS[code] for code in row] for row in self._cells]
-        for number, (r, c) in enumerate(self._starts, 1):
-            rows[r][c] = str(number)
-        return "\n".join("".join(row) for row in rows)
+        """The drawing that :meth:`from_ascii` reads back to an equal layout.
+
+        Floor is a space; in an outermost row or column of nothing but floor it is a dot, which no editor strips.
+        """
+        return draw(self._cells, self._starts)
 
     # -- what is where -------------------------------------------------------------------------------------------------
 
@@ -292,7 +302,7 @@ class OvercookedLayout:
     @cached_property
     def layout_id(self) -> str:
         """Twelve hexadecimal digits that identify the content, the same on every machine and in every version."""
-        return hashlib.sha256(self.to_ascii().encode()).hexdigest()[:12]
+        return hashlib.sha256(draw(self._cells, self._starts, margin=False).encode()).hexdigest()[:12]
 
     def distances_from(self, cells: Iterable[Sequence[int]]) -> npt.NDArray[np.int32]:
         """``(H, W)`` number of floor moves from the nearest of the given floor cells; -1 where no path leads."""
@@ -311,7 +321,7 @@ class OvercookedLayout:
         cells = self._cells.copy()
         for cell, value in changes.items():
             if isinstance(value, str):
-                value = STATION_CODES[value] if value in STATION_CODES else _CODE_OF.get(value, -1)
+                value = STATION_CODES[value] if value in STATION_CODES else _code_of(value)
             cells[cell] = value
         return OvercookedLayout(cells, self._starts)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from inspect import signature
@@ -11,8 +12,10 @@ from typing import Any, Final, Protocol, runtime_checkable
 import numpy as np
 
 from legible_envs.errors import LayoutError
+from legible_envs.overcooked.drawings import COUNTER, FLOOR, STATION_CODES, STATION_TYPES
+from legible_envs.overcooked.kitchen_file import ENTRIES, KitchenFile
 from legible_envs.overcooked.layout import OvercookedLayout, check_shape
-from legible_envs.support.validation import choice, integer, real, shown
+from legible_envs.support.validation import choice, entries, integer, real, shown
 
 __all__ = [
     "DEFAULT_KITCHEN",
@@ -21,6 +24,7 @@ __all__ = [
     "RandomLayouts",
     "default_layout",
     "read_distribution",
+    "read_kitchen",
     "read_layout",
 ]
 
@@ -33,8 +37,10 @@ F     P
 X  1  X
 XXXSXXX"""
 
+DEFAULT_SHAPE: Final = (7, 7)
 SPLITS: Final = ("all", "train", "test")
 MAX_TRIES: Final = 10_000
+_ENDINGS: Final = (".layout", ".txt", ".json", ".yaml", ".npz", ".csv", ".py")
 
 
 @runtime_checkable
@@ -64,7 +70,8 @@ class RandomLayouts:
             ``{"locked": …, "forbidden": …}``.
 
     Raises:
-        ValueError: Arguments out of range, or a split so small that no kitchen of it turned up in 10,000 draws.
+        ValueError: Arguments out of range or unknown; when kitchens are drawn, also those of ``workspace`` that it
+            refuses, and a split so small that no kitchen of it turned up in 10,000 draws.
 
     Example:
         >>> train, test = RandomLayouts((7, 7)).split(test_fraction=0.25)
@@ -91,9 +98,7 @@ class RandomLayouts:
         self.obstacle_rate = real("obstacle_rate", obstacle_rate, 0, 1, closed="left")
         self.num_layouts = None if num_layouts is None else integer("num_layouts", num_layouts, 1, also="None")
         self.layout_seed = integer("layout_seed", layout_seed, 0, math.inf, whole_floats=True)
-        if not isinstance(workspace, Mapping | None):
-            raise ValueError(f"`workspace` must be None or a mapping of arguments, got {shown(workspace)}")
-        self.workspace = dict(workspace or {})
+        self.workspace = _checked_workspace(workspace)
         self._workspace: Any = None
         self._layouts: tuple[OvercookedLayout, ...] | None = None
 
@@ -152,22 +157,36 @@ class RandomLayouts:
         return f"RandomLayouts({arguments})"
 
 
+def _checked_workspace(workspace: object) -> dict[str, Any]:
+    if not isinstance(workspace, Mapping | None):
+        raise ValueError(f"`workspace` must be None or a mapping of arguments, got {shown(workspace)}")
+    arguments = dict(workspace or {})
+    if arguments:
+        from legible_envs.overcooked.design.workspace import OvercookedWorkspace
+
+        known = [name for name in signature(OvercookedWorkspace).parameters if name != "shape"]
+        if unknown := [key for key in arguments if key not in known]:
+            raise ValueError(f"`workspace` has unknown arguments {shown(unknown)}; known: {known}")
+    return arguments
+
+
 class LayoutSet:
     """Uniform over given kitchens.
 
     Args:
         layouts: Kitchens, or anything that :func:`read_layout` understands.
-        shape: Rows and columns they must have.
+        shape: Rows and columns they must have; None: those of the first.
 
     Raises:
         LayoutError: No kitchen, or one that is not one of this shape.
     """
 
-    def __init__(self, layouts: Sequence[Any], shape: Sequence[int]) -> None:
-        self.shape = check_shape(shape)
-        self.layouts = tuple(read_layout(layout, self.shape) for layout in layouts)
-        if not self.layouts:
+    def __init__(self, layouts: Sequence[Any], shape: Sequence[int] | None = None) -> None:
+        if not len(layouts):
             raise LayoutError("`layouts` must hold at least one kitchen, got none", rule="type")
+        first = read_layout(layouts[0], None if shape is None else check_shape(shape))
+        self.shape = first.shape
+        self.layouts = (first, *(read_layout(layout, self.shape) for layout in layouts[1:]))
 
     def sample(self, rng: np.random.Generator) -> OvercookedLayout:
         """Draw one kitchen; all randomness comes from ``rng``."""
@@ -178,13 +197,13 @@ class LayoutSet:
         return [layout.to_ascii() for layout in self.layouts]
 
 
-def read_distribution(value: Any, shape: tuple[int, int]) -> LayoutDistribution:
-    """Turn whatever describes a distribution of kitchens into one of the given shape.
+def read_distribution(value: Any, shape: tuple[int, int] | None = None) -> LayoutDistribution:
+    """Turn whatever describes a distribution of kitchens into one.
 
     Args:
         value: ``"random"``, ``"random:train"``, ``"random:test"``; a mapping with ``"kind": "random"`` and arguments of
             :class:`RandomLayouts`; a list of kitchens; or an object with a method ``sample(rng)``.
-        shape: Rows and columns of the kitchens.
+        shape: Rows and columns of the kitchens; None takes the distribution's own, or 7 and 7 where it has none.
 
     Raises:
         ValueError: Not a distribution, or one of another shape.
@@ -193,21 +212,21 @@ def read_distribution(value: Any, shape: tuple[int, int]) -> LayoutDistribution:
     if isinstance(value, str):
         kind, _, split = value.partition(":")
         if kind == "random" and (not split or split in SPLITS):
-            return RandomLayouts(shape, split=split or "all")
+            return RandomLayouts(shape or DEFAULT_SHAPE, split=split or "all")
     elif isinstance(value, Mapping):
-        arguments = {"shape": shape, **value}
+        arguments = {"shape": shape or DEFAULT_SHAPE, **value}
         if arguments.pop("kind", None) == "random":
             known = list(signature(RandomLayouts).parameters)
             unknown = sorted(str(key) for key in arguments if key not in known)
             if unknown:
                 raise ValueError(f"`layouts` has unknown keys {unknown}; known: {known}")
             own = check_shape(arguments["shape"])
-            if own != shape:
+            if own != (shape or own):
                 raise ValueError(f"`layouts` is of shape {own}, the environment of shape {shape}")
             return RandomLayouts(**arguments)
     elif isinstance(value, LayoutDistribution):
-        if tuple(getattr(value, "shape", shape)) != shape:
-            raise ValueError(f"`layouts` draws kitchens of shape {value.shape}, the environment needs {shape}")  # type: ignore[attr-defined]
+        if shape is not None and (own := tuple(getattr(value, "shape", shape))) != shape:
+            raise ValueError(f"`layouts` draws kitchens of shape {own}, the environment needs {shape}")
         return value
     elif isinstance(value, Sequence):
         return LayoutSet(value, shape)
@@ -217,50 +236,125 @@ def read_distribution(value: Any, shape: tuple[int, int]) -> LayoutDistribution:
     )
 
 
-@lru_cache(maxsize=64)
-def default_layout(shape: tuple[int, int]) -> OvercookedLayout:
+def shape_of(distribution: LayoutDistribution) -> tuple[int, int]:
+    """Rows and columns of a distribution's kitchens: what it says, or those of one that it draws."""
+    own = getattr(distribution, "shape", None)
+    if own is not None:
+        return check_shape(own)
+    return read_layout(distribution.sample(np.random.default_rng(0))).shape
+
+
+# -- the default -------------------------------------------------------------------------------------------------------
+
+
+def default_layout(shape: tuple[int, int], kinds: Sequence[str] = STATION_TYPES) -> OvercookedLayout:
     """The kitchen of an environment that was given none: always the same one for a shape.
 
-    Raises:
-        LayoutError: The shape is too small for the stations.
-    """
-    if shape == (7, 7):
-        return OvercookedLayout.from_ascii(DEFAULT_KITCHEN)
-    return RandomLayouts(shape, obstacle_rate=0.1).sample(np.random.default_rng(0))
-
-
-def read_layout(value: Any, shape: tuple[int, int]) -> OvercookedLayout:
-    """Turn whatever describes a kitchen into one of the given shape.
+    It is a random one under the rules of design where the shape has room for one, with all types of stations. Where it
+    has not, stations stand closer: along the walls, all types if they fit, else those that are needed.
 
     Args:
-        value: An :class:`OvercookedLayout`, an ASCII drawing, a list of row strings, nested lists of symbols, a 2-D
-            array of cell codes, or a genome (1-D integers) of ``OvercookedWorkspace(shape)``.
-        shape: Rows and columns it must have.
+        shape: Rows and columns.
+        kinds: Types of stations that are needed.
+
+    Raises:
+        LayoutError: The walls have fewer places than are needed.
+    """
+    return _default(tuple(shape), tuple(kind for kind in STATION_TYPES if kind in kinds))
+
+
+@lru_cache(maxsize=64)
+def _default(shape: tuple[int, int], needed: tuple[str, ...]) -> OvercookedLayout:
+    if shape == DEFAULT_SHAPE:
+        return OvercookedLayout.from_ascii(DEFAULT_KITCHEN)
+    from legible_envs.overcooked.design.rules import DesignRules
+
+    rules = DesignRules(shape, STATION_TYPES, locked={}, forbidden=(), distinct_access=False)
+    if len(STATION_TYPES) <= rules.most_stations:
+        return RandomLayouts(shape, obstacle_rate=0.1).sample(np.random.default_rng(0))
+    kinds = STATION_TYPES if len(STATION_TYPES) <= len(rules.slots) else needed
+    if len(kinds) > len(rules.slots):
+        raise LayoutError(
+            f"a {shape[0]}x{shape[1]} kitchen has places for {len(rules.slots)} stations along its walls, and the "
+            f"recipes need {len(kinds)} ({', '.join(kinds)}); give a larger `shape=`, or `recipes=` with fewer "
+            "ingredients",
+            rule="room",
+        )
+    cells = np.full(shape, COUNTER, dtype=np.int8)
+    cells[1:-1, 1:-1] = FLOOR
+    for number, kind in enumerate(kinds):
+        cells[rules.slots[number * len(rules.slots) // len(kinds)]] = STATION_CODES[kind]
+    return OvercookedLayout(cells)
+
+
+# -- one kitchen -------------------------------------------------------------------------------------------------------
+
+
+def read_kitchen(value: Any, shape: tuple[int, int] | None = None, *, orders: bool = True) -> KitchenFile:
+    """Turn whatever describes a kitchen into its layout, with the orders that come with it.
+
+    Args:
+        value: An :class:`OvercookedLayout`, a :class:`.KitchenFile`, the text or the entries of a kitchen in any form
+            that :class:`.KitchenFile` reads, a list of row strings, nested lists of symbols, a 2-D array of cell codes,
+            or a genome (1-D integers) of ``OvercookedWorkspace(shape)``. A string is never the name of a file.
+        shape: Rows and columns it must have; None: any, and genomes are those of 7 x 7 kitchens.
+        orders: Whether orders are read; without, what they hold does not matter.
 
     Raises:
         LayoutError: Not a layout, of another shape, or a genome that is invalid; names the cell where there is one.
     """
-    if isinstance(value, OvercookedLayout):
-        layout = value
-    elif isinstance(value, str):
-        layout = OvercookedLayout.from_ascii(value)
-    elif isinstance(value, Sequence) and value and all(isinstance(row, str) for row in value):
-        layout = OvercookedLayout.from_rows(value)
-    elif isinstance(value, Sequence | np.ndarray) and len(value):
-        layout = _read_array(value, shape)
-    else:
+    kitchen = _read_any(value, shape, orders)
+    if shape is not None and kitchen.layout.shape != shape:
         raise LayoutError(
-            "a `layout` must be an OvercookedLayout, an ASCII drawing, a nested list of symbols or a genome, "
-            f"got {type(value).__name__}: {shown(value)}",
-            rule="type",
-        )
-    if layout.shape != shape:
-        raise LayoutError(
-            f"this environment was made for kitchens of shape {shape}, got one of shape {layout.shape}; "
+            f"this environment was made for kitchens of shape {shape}, got one of shape {kitchen.layout.shape}; "
             "make another with `shape=`",
             rule="shape",
         )
-    return layout
+    return kitchen
+
+
+def read_layout(value: Any, shape: tuple[int, int] | None = None) -> OvercookedLayout:
+    """The layout of whatever describes a kitchen; see :func:`read_kitchen`.
+
+    Raises:
+        LayoutError: Not a layout, of another shape, or a genome that is invalid; names the cell where there is one.
+    """
+    return read_kitchen(value, shape, orders=False).layout
+
+
+def _read_any(value: Any, shape: tuple[int, int] | None, orders: bool) -> KitchenFile:
+    if isinstance(value, KitchenFile):
+        return value
+    if isinstance(value, OvercookedLayout):
+        return KitchenFile(value)
+    if isinstance(value, str):
+        return _read_text(value, orders)
+    if (isinstance(value, Mapping) and not ENTRIES.isdisjoint(value)) or (
+        isinstance(value, Sequence) and value and all(isinstance(r, str) for r in value)
+    ):
+        return KitchenFile.from_data(value, orders=orders)
+    if entries(value) and isinstance(value, Sequence | np.ndarray):
+        return KitchenFile(_read_array(value, shape or DEFAULT_SHAPE))
+    file = "; a file is read with `KitchenFile.read(path)`" if isinstance(value, os.PathLike) else ""
+    raise LayoutError(
+        "a `layout` must be an OvercookedLayout, a KitchenFile, an ASCII drawing, a nested list of symbols, a mapping "
+        f"with one of {sorted(ENTRIES)}, or a genome, got {type(value).__name__}: {shown(value)}{file}",
+        rule="type",
+    )
+
+
+def _read_text(text: str, orders: bool) -> KitchenFile:
+    try:
+        return KitchenFile.from_text(text, orders=orders)
+    except LayoutError as error:
+        name = text.strip()
+        if "\n" in name or not name.endswith(_ENDINGS):
+            raise
+        raise LayoutError(
+            f"a `layout` is a drawing or the text of a file, and {shown(name)} looks like the name of one; read it "
+            f"with `KitchenFile.read({shown(name)})`",
+            rule="type",
+        ) from error
 
 
 def _read_array(value: Any, shape: tuple[int, int]) -> OvercookedLayout:
@@ -290,4 +384,6 @@ def _read_array(value: Any, shape: tuple[int, int]) -> OvercookedLayout:
     except LayoutError:
         raise
     except ValueError as error:
-        raise LayoutError(f"not a genome of kitchens of shape {shape}: {error}", rule="genome") from error
+        raise LayoutError(
+            f"not a genome of kitchens of shape {shape}: {error}; genomes of others need their `shape=`", rule="genome"
+        ) from error

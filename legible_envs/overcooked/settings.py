@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +15,14 @@ from legible_envs.overcooked.game.observations import GRID_CHANNELS, NUM_FEATURE
 from legible_envs.overcooked.game.rules import GameRules, count_pots, pack_kitchen, pack_rules
 from legible_envs.overcooked.game.vectors import Kitchen, Vector
 from legible_envs.overcooked.layout import INGREDIENTS, STATION_TYPES, OvercookedLayout, check_shape
-from legible_envs.overcooked.layouts import LayoutDistribution, default_layout, read_distribution, read_layout
+from legible_envs.overcooked.layouts import (
+    DEFAULT_SHAPE,
+    LayoutDistribution,
+    default_layout,
+    read_distribution,
+    read_kitchen,
+    shape_of,
+)
 from legible_envs.overcooked.recipes import PAPER_SOUPS, check_recipes
 from legible_envs.overcooked.rendering.board import RGB_TILE
 from legible_envs.support.validation import choice, real, switched_weights
@@ -44,24 +51,27 @@ class KitchenSettings:
     def __init__(
         self,
         *,
-        shape: Sequence[int] = (7, 7),
+        shape: Sequence[int] | None = None,
         layout: Any = None,
         layouts: Any = None,
-        recipes: Sequence[Sequence[str]] = PAPER_SOUPS,
+        recipes: Sequence[Sequence[str]] | Literal["own"] = "own",
         cook_time: int = 20,
         obs_type: str = "grid",
         virtual_obstacles: str = "hard",
         crossing_cost: float = 0.0,
         shaping: bool | Mapping[str, float] = False,
     ) -> None:
-        self.shape = check_shape(shape)
+        asked = None if shape is None else check_shape(shape)
         self.obs_type = choice("obs_type", obs_type, OBS_TYPES)
         virtual_obstacles = choice("virtual_obstacles", virtual_obstacles, ("hard", "soft"))
         crossing_cost = real("crossing_cost", crossing_cost, 0)
         if layout is not None and layouts is not None:
             raise ValueError("give either `layout` (one kitchen) or `layouts` (a distribution), not both")
+        takes_own = isinstance(recipes, str) and recipes == "own"
+        kitchen = None if layout is None else read_kitchen(layout, asked, orders=takes_own)
+        own = PAPER_SOUPS if kitchen is None else kitchen.recipes or PAPER_SOUPS
         self.rules = GameRules(
-            recipes=check_recipes(recipes),
+            recipes=check_recipes(own if takes_own else recipes),
             cook_time=cook_time,
             soft_obstacles=virtual_obstacles == "soft",
         )
@@ -70,9 +80,16 @@ class KitchenSettings:
         self.distribution: LayoutDistribution | None = None
         self.layout: OvercookedLayout | None = None
         if layouts is not None:
-            self.distribution = read_distribution(layouts, self.shape)
+            self.distribution = read_distribution(layouts, asked)
+            self.shape = asked or shape_of(self.distribution)
         else:
-            self.layout = default_layout(self.shape) if layout is None else read_layout(layout, self.shape)
+            self.layout = default_layout(asked or DEFAULT_SHAPE, self._needed()) if kitchen is None else kitchen.layout
+            self.shape = self.layout.shape
+
+    def _needed(self) -> tuple[str, ...]:
+        """Types of stations without which the recipes cannot be cooked."""
+        ingredients = {kind for recipe in self.rules.recipes for kind in recipe}
+        return (*ingredients, "dish", "pot", "serving")
 
     def preview(self) -> OvercookedLayout:
         """The kitchen before the first reset: the only one, or an example of the distribution."""
@@ -112,7 +129,9 @@ class KitchenSettings:
         kind = STATION_TYPES[code - 3]
         names = layout.named(kind)
         if not names:
-            raise LayoutError(f"the kitchen has no {kind} station, which the recipes need", rule="station")
+            raise LayoutError(
+                f"the kitchen has no {kind} station, which the recipes need; `recipes=` orders others", rule="station"
+            )
         row, col = layout.stations[names[0]]
         start = layout.starts[0]
         raise LayoutError(

@@ -204,6 +204,11 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
         """Close the window, if there is one."""
         self._close_window()
 
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of all kitchens of these games."""
+        return self.settings.shape
+
     # -- each game ----------------------------------------------------------------------------------------------------
 
     def game(self, index: int) -> GameOfBatch:

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.errors import LayoutError
+from legible_envs.support.text import clean_text, read_text
 from legible_envs.tabletop.objects import (
     OBSTACLE_SIZE,
     Table,
@@ -307,11 +308,16 @@ class TabletopLayout:
             FileNotFoundError: The file does not exist.
         """
         is_file = isinstance(source, Path) or ("\n" not in source and source.endswith(".json"))
-        text = Path(source).read_text(encoding="utf-8") if is_file else str(source)
+        try:
+            text = read_text(source) if is_file else clean_text(str(source))
+        except ValueError as error:  # no text; names the file
+            raise LayoutError(str(error), rule="schema") from error
         try:
             data = json.loads(text)
         except json.JSONDecodeError as error:
             raise LayoutError(f"not valid JSON: {error}", rule="schema") from error
+        except (ValueError, RecursionError) as error:
+            raise LayoutError(f"not the JSON of a table: {error}", rule="schema") from error
         return cls.from_dict(data)
 
     # -- genomes -------------------------------------------------------------------------------------------------------

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.errors import LayoutError, TaskError
+from legible_envs.support.text import clean_text, read_text
 from legible_envs.support.validation import shown
 from legible_envs.tabletop.layout import TabletopLayout
 from legible_envs.tabletop.objects import Point, point, rectangle, rectangles_overlap
@@ -183,7 +184,10 @@ class TabletopTask:
         import yaml
 
         is_file = isinstance(source, Path) or ("\n" not in source and source.endswith((".yaml", ".yml")))
-        text = Path(source).read_text(encoding="utf-8") if is_file else str(source)
+        try:
+            text = read_text(source) if is_file else clean_text(str(source))
+        except ValueError as error:  # no text; names the file
+            raise TaskError(str(error)) from error
         try:
             data = yaml.safe_load(text)
         except yaml.YAMLError as error:

@@ -29,6 +29,7 @@ BAD = {
 }
 
 ALLOWED = {
+    (OvercookedEnv, "shape"): {"none"},
     (OvercookedEnv, "layout"): {"none"},
     (OvercookedEnv, "layouts"): {"none"},
     (OvercookedEnv, "shaping"): {"bool"},
@@ -150,7 +151,7 @@ def test_bad_values_inside_an_argument_name_it(case, bad):
 
 
 @pytest.mark.parametrize(
-    "arguments", [{"shape": None}, {"recipes": None}, {"recipes": 5}, {"crossing_cost": "a"}], ids=str
+    "arguments", [{"shape": 7}, {"recipes": None}, {"recipes": 5}, {"crossing_cost": "a"}], ids=str
 )
 def test_the_same_through_gymnasium(arguments):
     (name,) = arguments

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from legible_envs.overcooked.scoring.genome_kernels import Geometry, connected, place_obstacles
+from legible_envs.overcooked.scoring.genome_kernels import Genomes, Geometry, connected, place_obstacles
 from legible_envs.support.compiled import kernel
 
 __all__ = ["decode_kitchens"]
@@ -78,9 +78,7 @@ def place_by_keys(
 
 
 @kernel
-def decode_kitchens(
-    keys: Keys, geometry: Geometry, order: npt.NDArray[np.int64], genomes: npt.NDArray[np.int8]
-) -> bool:
+def decode_kitchens(keys: Keys, geometry: Geometry, order: npt.NDArray[np.int64], genomes: Genomes) -> bool:
     """Write the kitchens that ``keys [B, N + I]`` stand for to ``genomes [B, N + I]``.
 
     Stations come first (:func:`place_by_keys`). Then every inner cell whose key is above one half becomes an obstacle,

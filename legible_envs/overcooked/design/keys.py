@@ -27,6 +27,7 @@ class KitchenKeys(KeyDecoder):
 
     def __init__(self, rules: DesignRules) -> None:
         self._geometry = rules.geometry
+        self._dtype = rules.dtype
         self._upper = np.asarray(rules.upper_bounds, dtype=np.float64)
         self.size = len(self._upper)
         # Stations with the fewest places first: the locked ones stand before others look for room.
@@ -41,13 +42,13 @@ class KitchenKeys(KeyDecoder):
         keys: npt.NDArray[np.float64],
         anchors: npt.NDArray[Any] | None = None,
         rng: np.random.Generator | None = None,
-    ) -> npt.NDArray[np.int8]:
+    ) -> npt.NDArray[Any]:
         """``(n, d)`` valid genomes of ``(n, m)`` keys; neither ``anchors`` nor ``rng`` is needed.
 
         Raises:
             RuntimeError: The rules leave no room for the stations.
         """
-        genomes = np.empty(keys.shape, dtype=np.int8)
+        genomes = np.empty(keys.shape, dtype=self._dtype)
         if not decode_kitchens(np.clip(keys, 0.0, 1.0), self._geometry, self._order, genomes):
             raise RuntimeError("the rules of this workspace leave no room for its stations")
         return genomes

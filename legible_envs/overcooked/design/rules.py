@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -26,7 +26,8 @@ from legible_envs.support.validation import entries, flag, integer, shown
 
 __all__ = ["DesignRules"]
 
-MAX_SLOTS: Final = 127
+Genomes = npt.NDArray[np.signedinteger[Any]]
+"""Genomes, in the type that :attr:`DesignRules.dtype` names."""
 
 
 class DesignRules:
@@ -36,6 +37,7 @@ class DesignRules:
         slots: Border cells a station may stand on, clockwise from the top-left, corners left out.
         slot_access: The inner cell in front of each slot.
         inner: Inner cells, row by row.
+        dtype: Integers that hold every slot: ``int8`` up to 33 x 33 cells or the same circumference, else ``int16``.
         geometry: The same as tables for the kernels.
     """
 
@@ -55,12 +57,7 @@ class DesignRules:
         bottom = [(rows - 1, c) for c in range(cols - 2, 0, -1)]
         left = [(r, 0) for r in range(rows - 2, 0, -1)]
         self.slots: list[Cell] = [*top, *right, *bottom, *left]
-        if len(self.slots) > MAX_SLOTS:
-            raise LayoutError(
-                f"shape {self.shape} has {len(self.slots)} places for stations; genomes are int8, so at most "
-                f"{MAX_SLOTS} fit (33x33)",
-                rule="shape",
-            )
+        self.dtype: np.dtype[Any] = np.dtype(np.int8 if len(self.slots) - 1 <= np.iinfo(np.int8).max else np.int16)
         self.slot_access: list[Cell] = [(min(max(r, 1), rows - 2), min(max(c, 1), cols - 2)) for r, c in self.slots]
         self.inner: list[Cell] = [(r, c) for r in range(1, rows - 1) for c in range(1, cols - 1)]
         self.stations = self._checked_stations(stations)
@@ -136,12 +133,18 @@ class DesignRules:
             may_block=np.array([cell not in self.forbidden for cell in self.inner]),
         )
 
+    @property
+    def most_stations(self) -> int:
+        """How many stations that are at least two apart there is room for, if all may stand anywhere."""
+        rows, cols = self.shape
+        return 2 * ((rows - 1) // 2) + 2 * ((cols - 1) // 2)  # every other place of a wall, its ends included
+
     # -- genomes and layouts ---------------------------------------------------------------------------------------
 
     @property
-    def upper_bounds(self) -> npt.NDArray[np.int8]:
+    def upper_bounds(self) -> Genomes:
         """``(d,)`` greatest value of each gene; the least is 0."""
-        return np.array([len(self.slots) - 1] * len(self.stations) + [1] * len(self.inner), dtype=np.int8)
+        return np.array([len(self.slots) - 1] * len(self.stations) + [1] * len(self.inner), dtype=self.dtype)
 
     def check(self, genome: npt.NDArray[Any]) -> None:
         """Raise a :class:`LayoutError` naming the first broken rule of a ``(d,)`` genome, and its cell."""
@@ -233,7 +236,7 @@ class DesignRules:
             cells[self.slots[int(slot)]] = STATION_CODES[name]
         return OvercookedLayout(cells)
 
-    def encode(self, layout: OvercookedLayout) -> npt.NDArray[np.int8]:
+    def encode(self, layout: OvercookedLayout) -> Genomes:
         """The ``(d,)`` genome of a layout.
 
         Raises:
@@ -243,7 +246,7 @@ class DesignRules:
             raise LayoutError(
                 f"the layout is {layout.shape}, the workspace designs {self.shape} kitchens", rule="shape"
             )
-        genome = np.zeros(len(self.upper_bounds), dtype=np.int8)
+        genome = np.zeros(len(self.upper_bounds), dtype=self.dtype)
         found: dict[str, Cell] = {}
         for (row, col), code in np.ndenumerate(layout.cells):
             cell, where = (row, col), f"row {row}, column {col}"

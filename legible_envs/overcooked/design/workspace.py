@@ -15,19 +15,21 @@ from legible_envs.errors import LayoutError, TaskError
 from legible_envs.observer import ObserverModel, Ties, check_prefix
 from legible_envs.overcooked.design import genome_kernels as kernels
 from legible_envs.overcooked.design.keys import KitchenKeys
-from legible_envs.overcooked.design.rules import DesignRules
+from legible_envs.overcooked.design.rules import DesignRules, Genomes
 from legible_envs.overcooked.grid import Cell
+from legible_envs.overcooked.kitchen_file import KitchenFile
 from legible_envs.overcooked.layout import INGREDIENTS, STATION_TYPES, OvercookedLayout
 from legible_envs.overcooked.recipes import PAPER_SOUPS, check_recipes, soup_task
 from legible_envs.overcooked.scoring.boltzmann import HumanModel, HumanName
 from legible_envs.overcooked.scoring.genome_kernels import score_genomes, valid_genomes
 from legible_envs.overcooked.scoring.scorer import OvercookedScorer
-from legible_envs.overcooked.scoring.tables import make_tables
+from legible_envs.overcooked.scoring.tables import check_task, make_tables
 from legible_envs.support.validation import choice, entries, integer, real, shown
 from legible_envs.tasks import TaskGraph
 from legible_envs.workspace import Array, Workspace, as_batch, as_single, check_draws, make_workspace
 
 if TYPE_CHECKING:
+    from legible_envs.overcooked.scoring.exact_kernels import ScoreTables
     from legible_envs.rollouts.trajectory import Trajectory
 
 __all__ = ["OvercookedWorkspace"]
@@ -43,12 +45,13 @@ class OvercookedWorkspace(Workspace):
     corners; any inner cell may be a virtual obstacle. It is valid if stations stand at Manhattan distance >= 2 of one
     another, the cell in front of each is free, and all are mutually reachable.
 
-    Genomes are ``int8[len(stations) + (H-2)(W-2)]``: the slot of each station (clockwise from the top-left, corners
-    left out), then a bit for each inner cell, row by row. Measures are the number of obstacles and the lexicographic
-    rank of the order in which the ranked stations are met when the kitchen is read row by row.
+    Genomes are ``int8[len(stations) + (H-2)(W-2)]`` (``int16`` beyond 33 x 33): the slot of each station (clockwise
+    from the top-left, corners left out), then a bit for each inner cell, row by row. Measures are the number of
+    obstacles and the lexicographic rank of the order in which the ranked stations are met when the kitchen is read row
+    by row.
 
     Args:
-        shape: Rows and columns, at least 3 each.
+        shape: Rows and columns, 3 to 64 each.
         prefix: Which prefixes of a trajectory count: ``"mean"`` over all, their ``"sum"``, or a tuple of fractions.
         c: Cost per step observed while the predicted goal is wrong (Eq. 2).
         beta: Rationality per unit of path cost that the observer assumes (Eq. 1).
@@ -68,7 +71,7 @@ class OvercookedWorkspace(Workspace):
         locked: Stations that stay: ``{type: (row, col)}``, or type names whose cells ``start_from`` gives.
         forbidden: Border cells that take no station, inner cells that take no obstacle.
         distinct_access: Whether two stations may not share the cell they are used from.
-        start_from: An existing kitchen (layout or ASCII); it is the first layout of every sample.
+        start_from: An existing kitchen (layout, or the text of one); it is the first layout of every sample.
         relocation_cost: What an objective loses for every station that stands elsewhere than in ``start_from``.
         cell_costs: ``(H, W)`` cost of stepping on each cell (> 0), for people and observer alike; None means 1 each.
 
@@ -126,7 +129,7 @@ class OvercookedWorkspace(Workspace):
         if not isinstance(self._custom_task, TaskGraph | None):
             raise TaskError(f"`task` must be None, a TaskGraph or its to_dict(), got {shown(task)}")
         self.task = self._custom_task or soup_task(self.recipes, pots)
-        self.start_from = OvercookedLayout.from_ascii(start_from) if isinstance(start_from, str) else start_from
+        self.start_from = _read(start_from) if isinstance(start_from, str) else start_from
         if not isinstance(self.start_from, OvercookedLayout | None):
             raise LayoutError(
                 f"`start_from` must be None, an OvercookedLayout or a drawing, got {shown(start_from)}", rule="type"
@@ -142,8 +145,7 @@ class OvercookedWorkspace(Workspace):
         self.ranked = self._checked_ranked(ranked)
         people = HumanModel(human, rationality, horizon).within(len(self.rules.inner))
         self.human, self.rationality, self.horizon = people.name, people.rationality, people.horizon
-        longest = max(len(self.rules.inner), self.horizon or 0)
-        self._tables = make_tables(self.task, self.stations, observer, num_floor=longest)
+        check_task(self.task, self.stations)
         self.cell_costs = _checked_costs(cell_costs, self.shape, observer.tie_tolerance)
         self.scorer = OvercookedScorer(self.task, observer=observer, human=people, cell_costs=self.cell_costs)
         self._home = None if self.start_from is None else self.rules.encode(self.start_from)
@@ -175,16 +177,16 @@ class OvercookedWorkspace(Workspace):
 
     @property
     def genome_dtype(self) -> np.dtype[Any]:
-        """``int8``."""
-        return np.dtype(np.int8)
+        """``int8`` where that holds every slot, as up to 33 x 33 cells; else ``int16``."""
+        return self.rules.dtype
 
     @property
-    def lower_bounds(self) -> npt.NDArray[np.int8]:
+    def lower_bounds(self) -> Genomes:
         """``(d,)`` zeros."""
         return np.zeros_like(self.rules.upper_bounds)
 
     @property
-    def upper_bounds(self) -> npt.NDArray[np.int8]:
+    def upper_bounds(self) -> Genomes:
         """``(d,)`` last slot for stations, 1 for obstacle bits."""
         return self.rules.upper_bounds
 
@@ -192,11 +194,11 @@ class OvercookedWorkspace(Workspace):
         """The layout of one ``(d,)`` genome; a :class:`LayoutError` names the cell and the rule it breaks."""
         return self.rules.decode(as_single(genome, self.genome_size)[0])
 
-    def encode(self, layout: OvercookedLayout | str) -> npt.NDArray[np.int8]:
-        """The ``(d,)`` genome of a layout or ASCII drawing; a :class:`LayoutError` says why there is none."""
-        return self.rules.encode(OvercookedLayout.from_ascii(layout) if isinstance(layout, str) else layout)
+    def encode(self, layout: OvercookedLayout | str) -> Genomes:
+        """The ``(d,)`` genome of a layout or the text of one; a :class:`LayoutError` says why there is none."""
+        return self.rules.encode(_read(layout) if isinstance(layout, str) else layout)
 
-    def sample(self, n: int, rng: np.random.Generator, *, obstacle_rate: float = 0.2) -> npt.NDArray[np.int8]:
+    def sample(self, n: int, rng: np.random.Generator, *, obstacle_rate: float = 0.2) -> Genomes:
         """``(n, d)`` random valid genomes, by rejecting whole layouts.
 
         Args:
@@ -205,11 +207,18 @@ class OvercookedWorkspace(Workspace):
             obstacle_rate: Probability of each inner cell to be an obstacle before rejection (the paper's 20 %).
 
         Raises:
-            LayoutError: Two million draws in a row broke a rule: the rules leave (almost) no room.
+            LayoutError: The shape has no room for the stations; or two million draws in a row broke a rule: the rules
+                leave (almost) no room.
         """
         check_draws(rng, n=n)
         obstacle_rate = real("obstacle_rate", obstacle_rate, 0, 1)
-        genomes = np.zeros((n, self.genome_size), dtype=np.int8)
+        if n and len(self.stations) > self.rules.most_stations:
+            raise LayoutError(
+                f"no valid layout: a {self.shape[0]}x{self.shape[1]} kitchen has room for {self.rules.most_stations} "
+                f"stations at least 2 apart, not for {len(self.stations)}; take a larger shape or fewer `stations`",
+                rule="room",
+            )
+        genomes = np.zeros((n, self.genome_size), dtype=self.genome_dtype)
         first = 0
         if self._home is not None and n:
             genomes[0], first = self._home, 1
@@ -222,9 +231,7 @@ class OvercookedWorkspace(Workspace):
             )
         return genomes
 
-    def perturb(
-        self, genomes: npt.NDArray[Any], k: int, rng: np.random.Generator, phase: int = 0
-    ) -> npt.NDArray[np.int8]:
+    def perturb(self, genomes: npt.NDArray[Any], k: int, rng: np.random.Generator, phase: int = 0) -> Genomes:
         """``(n * k, d)`` valid children of ``(n, d)`` valid parents, grouped by parent.
 
         Each child differs by one change: a station moved to a free counter, two stations swapped, an obstacle added,
@@ -232,25 +239,25 @@ class OvercookedWorkspace(Workspace):
         """
         check_draws(rng, k=k)
         choice("phase", phase, range(self.phases))
-        parents, valid = self._as_int8(genomes)
+        parents, valid = self._as_genomes(genomes)
         if not (valid & self.valid(parents)).all():
             self.decode(np.asarray(genomes)[int(np.argmin(valid & self.valid(parents)))])
-        children = np.empty((len(parents) * k, self.genome_size), dtype=np.int8)
+        children = np.empty((len(parents) * k, self.genome_size), dtype=self.genome_dtype)
         kernels.perturb_genomes(parents, k, self.rules.geometry, rng, children)
         return children
 
     def valid(self, genomes: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
         """``(n,)`` which genomes obey every rule."""
-        batch, in_range = self._as_int8(genomes)
+        batch, in_range = self._as_genomes(genomes)
         valid = np.empty(len(batch), dtype=np.bool_)
         valid_genomes(batch, self.rules.geometry, valid)
         return valid & in_range
 
-    def simplifications(self, genome: npt.NDArray[Any]) -> npt.NDArray[np.int8]:
+    def simplifications(self, genome: npt.NDArray[Any]) -> Genomes:
         """``(m, d)`` the genome without one of its ``m`` obstacles."""
         genome = as_single(genome, self.genome_size)[0]
         bits = np.flatnonzero(genome[len(self.stations) :]) + len(self.stations)
-        simpler = np.repeat(np.asarray(genome, dtype=np.int8)[None], len(bits), axis=0)
+        simpler = np.repeat(np.asarray(genome, dtype=self.genome_dtype)[None], len(bits), axis=0)
         simpler[np.arange(len(bits)), bits] = 0
         return simpler
 
@@ -258,16 +265,22 @@ class OvercookedWorkspace(Workspace):
         """How vectors of real numbers in [0, 1] stand for kitchens."""
         return KitchenKeys(self.rules)
 
-    def _as_int8(self, genomes: npt.ArrayLike) -> tuple[npt.NDArray[np.int8], npt.NDArray[np.bool_]]:
-        """Genomes as int8, and which rows that lost nothing (NaN, fractions and large numbers cannot be genomes)."""
+    def _as_genomes(self, genomes: npt.ArrayLike) -> tuple[Genomes, npt.NDArray[np.bool_]]:
+        """Genomes in their type, and which rows lost nothing by that (NaN, fractions, large numbers are no genes)."""
         batch = as_batch(genomes, self.genome_size)
-        if batch.dtype == np.int8:
+        if batch.dtype == self.genome_dtype:
             return np.ascontiguousarray(batch), np.ones(len(batch), dtype=np.bool_)
         with np.errstate(invalid="ignore"):
-            small = np.ascontiguousarray(batch.astype(np.int8))
+            small = np.ascontiguousarray(batch.astype(self.genome_dtype))
             return small, (small == batch).all(axis=1)
 
     # -- scores ----------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _tables(self) -> ScoreTables:
+        """Made when a score is asked for: those of the largest kitchens take seconds, and 120 MB."""
+        longest = max(len(self.rules.inner), self.horizon or 0)
+        return make_tables(self.task, self.stations, self.observer, num_floor=longest)
 
     @property
     def observer(self) -> ObserverModel:
@@ -276,7 +289,7 @@ class OvercookedWorkspace(Workspace):
 
     def scores(self, genomes: npt.NDArray[Any]) -> tuple[Array, Array]:
         """``(n,)`` legibility and ``(n,)`` expected floor moves per task execution; NaN where invalid."""
-        batch, in_range = self._as_int8(genomes)
+        batch, in_range = self._as_genomes(genomes)
         legibility, distance = np.empty(len(batch)), np.empty(len(batch))
         score_genomes(batch, self.rules.geometry, self._tables, legibility, distance)
         costs = np.ones(self.rules.geometry.num_cells) if self.cell_costs is None else self.cell_costs.ravel()
@@ -429,6 +442,10 @@ class OvercookedWorkspace(Workspace):
 
     def __reduce__(self) -> tuple[object, ...]:
         return make_workspace, (self.to_config(),)
+
+
+def _read(text: str) -> OvercookedLayout:
+    return KitchenFile.from_text(text, orders=False).layout
 
 
 def _checked_costs(

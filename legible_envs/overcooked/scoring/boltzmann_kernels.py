@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.overcooked.scoring.exact_kernels import BLOCKED, ScoreTables
-from legible_envs.overcooked.scoring.genome_kernels import Geometry, connected, place_obstacles, place_stations
+from legible_envs.overcooked.scoring.genome_kernels import Genomes, Geometry, connected, place_obstacles, place_stations
 from legible_envs.overcooked.scoring.weighted_kernels import costs_to
 from legible_envs.support.compiled import kernel
 
@@ -187,7 +187,7 @@ def score_cells_boltzmann(
 
 @kernel
 def score_genomes_boltzmann(
-    genomes: npt.NDArray[np.int8],
+    genomes: Genomes,
     geometry: Geometry,
     tables: ScoreTables,
     costs: Floats,

@@ -6,7 +6,7 @@ from the top-left, corners left out; inner cells are numbered row by row.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -39,7 +39,7 @@ class Geometry(NamedTuple):
     may_block: npt.NDArray[np.bool_]
 
 
-Genomes = npt.NDArray[np.int8]
+Genomes = npt.NDArray[np.signedinteger[Any]]
 
 
 @kernel

@@ -13,9 +13,22 @@ from legible_envs.observer import ObserverModel, PrefixSpec, Ties
 from legible_envs.overcooked.scoring.exact_kernels import ScoreTables
 from legible_envs.tasks import TaskGraph
 
-__all__ = ["make_tables"]
+__all__ = ["check_task", "make_tables"]
 
 MAX_GOALS = 12
+
+
+def check_task(task: TaskGraph, stations: Sequence[str]) -> None:
+    """Check that a task can be done with these types of stations, and scored.
+
+    Raises:
+        TaskError: The task names a place that is no station, or has more than 12 goals.
+    """
+    unknown = [place for place in task.places if place not in stations]
+    if unknown:
+        raise TaskError(f"the task needs {unknown}, which the kitchen lacks; its stations are {list(stations)}")
+    if len(task.goals) > MAX_GOALS:
+        raise TaskError(f"at most {MAX_GOALS} different goals are supported, the task has {len(task.goals)}")
 
 
 def make_tables(task: TaskGraph, stations: Sequence[str], observer: ObserverModel, *, num_floor: int) -> ScoreTables:
@@ -28,14 +41,10 @@ def make_tables(task: TaskGraph, stations: Sequence[str], observer: ObserverMode
         num_floor: Largest possible number of floor cells, which bounds all distances.
 
     Raises:
-        TaskError: The task names a place that is no station, or has more than 12 goals.
+        TaskError: See :func:`check_task`.
     """
-    unknown = [place for place in task.places if place not in stations]
-    if unknown:
-        raise TaskError(f"the task needs {unknown}, which the kitchen lacks; its stations are {list(stations)}")
+    check_task(task, stations)
     goals = task.goals
-    if len(goals) > MAX_GOALS:
-        raise TaskError(f"at most {MAX_GOALS} different goals are supported, the task has {len(goals)}")
     stages = task.stages()
     starts = sorted({stage.start for stage in stages})
     weights = np.zeros((len(starts), 1 << len(goals)))

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.overcooked.scoring.exact_kernels import BLOCKED, FREE, ScoreTables
-from legible_envs.overcooked.scoring.genome_kernels import Geometry, connected, place_obstacles, place_stations
+from legible_envs.overcooked.scoring.genome_kernels import Genomes, Geometry, connected, place_obstacles, place_stations
 from legible_envs.support.compiled import kernel
 
 __all__ = ["score_genomes_weighted"]
@@ -170,7 +170,7 @@ def score_cells_weighted(
 
 @kernel
 def score_genomes_weighted(
-    genomes: npt.NDArray[np.int8],
+    genomes: Genomes,
     geometry: Geometry,
     tables: ScoreTables,
     costs: Floats,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import subprocess
 import sys
 
@@ -19,7 +20,8 @@ from legible_envs.errors import LayoutError, TaskError
 from legible_envs.overcooked import PAPER_SOUPS, OvercookedLayout, OvercookedWorkspace
 from legible_envs.overcooked.env import OvercookedEnv
 from legible_envs.overcooked.game.observations import GRID_CHANNELS, NUM_FEATURES
-from legible_envs.overcooked.layouts import read_layout
+from legible_envs.overcooked.layout import STATION_TYPES
+from legible_envs.overcooked.layouts import RandomLayouts, read_layout
 from legible_envs.overcooked.policies import ScriptedPlayer
 from tests.legible_envs.environment_cases import KITCHEN
 from tests.oracles.kitchen_oracle import any_kitchen
@@ -142,7 +144,7 @@ def test_bad_kitchens_are_named_and_change_nothing(case):
     with pytest.raises(LayoutError, match=message):
         env.unwrapped.layout = bad
     with pytest.raises(LayoutError, match=message):
-        gym.make(NAME, layout=bad)
+        gym.make(NAME, shape=(7, 7), layout=bad)
     assert data_equivalence(env.step(1), twin.step(1), exact=True)
     assert env.reset()[1]["layout_id"] == twin.reset()[1]["layout_id"]
 
@@ -198,7 +200,7 @@ def test_bad_arguments_and_actions_are_named():
         {"cook_time": -3},
         {"render_mode": "poem"},
         {"layouts": "bad"},
-        {"layouts": {"kind": "random", "shape": (5, 5)}},
+        {"shape": (7, 7), "layouts": {"kind": "random", "shape": (5, 5)}},
         {"layout": KITCHEN, "layouts": "random"},
     ):
         with pytest.raises(ValueError, match=r"`|unknown"):
@@ -350,3 +352,76 @@ def test_vector_says_where_things_are():
         np.testing.assert_allclose(obs[38:42], counts, rtol=1e-6)
         assert obs[51:].sum() == len(view.orders)
     assert ready > 0
+
+
+def test_the_shape_is_that_of_the_layout_where_none_is_given():
+    rows = ["XTXOXCXFX", "D       X", "X       P", "X   1   X", "XXXXXSXXX"]
+
+    class Always:
+        def sample(self, rng):
+            return OvercookedLayout.from_rows(rows)
+
+    for arguments in (
+        {"layout": rows},
+        {"layout": "\n".join(rows), "shape": None},
+        {"layout": OvercookedLayout.from_rows(rows).cells},
+        {"layouts": [rows, rows[::-1]]},
+        {"layouts": {"kind": "random", "shape": (5, 9)}},
+        {"layouts": RandomLayouts((5, 9))},
+        {"layouts": Always()},
+    ):
+        env = gym.make(NAME, **arguments)
+        assert env.unwrapped.shape == (5, 9)
+        assert env.observation_space.shape == (5, 9, 25)
+        env.reset(seed=0)
+        if not isinstance(arguments.get("layouts"), Always):
+            again = gym.make(gym.envs.registration.EnvSpec.from_json(env.spec.to_json()))
+            assert again.unwrapped.shape == (5, 9)
+            assert pickle.loads(pickle.dumps(env.unwrapped)).shape == (5, 9)
+    for mode in ("sync", "async", "vector_entry_point"):
+        envs = gym.make_vec(NAME, num_envs=2, vectorization_mode=mode, layout=rows)
+        assert envs.reset(seed=0)[0].shape == (2, 5, 9, 25)
+        assert envs.get_attr("shape") == ((5, 9), (5, 9))
+        again = gym.make_vec(gym.envs.registration.EnvSpec.from_json(envs.spec.to_json()), 2, mode)
+        assert again.reset(seed=0)[0].shape == (2, 5, 9, 25)
+        envs.close()
+        again.close()
+    assert gym.make(NAME).unwrapped.shape == gym.make(NAME, layouts="random").unwrapped.shape == (7, 7)
+    with pytest.raises(LayoutError, match=r"made for kitchens of shape \(7, 7\), got one of shape \(5, 9\)"):
+        gym.make(NAME, shape=(7, 7), layout=rows)
+    with pytest.raises(LayoutError, match="genomes of others need their `shape=`"):
+        gym.make(NAME, layout=np.zeros(22, dtype=np.int8))
+
+
+@pytest.mark.parametrize("shape", [(3, 5), (5, 3), (4, 4), (4, 5), (6, 4), (3, 7), (64, 64), (34, 33), (3, 64)])
+def test_every_shape_with_room_for_the_stations_has_a_default_kitchen(shape):
+    env = gym.make(NAME, shape=shape)
+    assert env.unwrapped.layout.shape == shape
+    assert env.unwrapped.layout == gym.make(NAME, shape=shape).unwrapped.layout
+    assert set(env.unwrapped.layout.stations) == set(STATION_TYPES)
+    obs, info = env.reset(seed=0)
+    cook = ScriptedPlayer(env, np.random.default_rng(0))
+    for _ in range(4000):
+        obs, _, over, _, info = env.unwrapped.step(cook(obs, info))
+        if over:
+            break
+    assert info["deliveries"] == 3
+
+
+@pytest.mark.parametrize("shape", [(3, 3), (3, 4), (4, 3)])
+def test_shapes_without_that_room_hold_what_fewer_recipes_need_or_say_what_to_give(shape):
+    with pytest.raises(LayoutError, match=r"along its walls, and the recipes need 7 .*; give a larger `shape=`"):
+        gym.make(NAME, shape=shape)
+    with pytest.raises(LayoutError, match=r"no valid layout: .* has room for 4 stations at least 2 apart, not for 7"):
+        gym.make(NAME, shape=shape, layouts="random")
+    env = gym.make(NAME, shape=shape, recipes=[["onion"]])
+    assert set(env.unwrapped.layout.stations) == {"onion", "dish", "pot", "serving"}
+    env.reset(seed=0)
+
+
+@pytest.mark.parametrize(
+    ("workspace", "message"), [({"a": 1}, r"unknown arguments \['a'\]"), ({"shape": (5, 5)}, "unknown"), (5, "mapping")]
+)
+def test_a_bad_workspace_in_a_distribution_is_named(workspace, message):
+    with pytest.raises(ValueError, match=f"`workspace`.*{message}"):
+        gym.make(NAME, layouts={"kind": "random", "workspace": workspace})

@@ -265,7 +265,7 @@ def test_bad_genomes():
     [
         ({"shape": (2, 7)}, LayoutError, "`shape` must be an integer from 3 to 64 cells, got 2"),
         ({"shape": 7}, LayoutError, "shape"),
-        ({"shape": (40, 40)}, LayoutError, "33x33"),
+        ({"shape": (7, 65)}, LayoutError, "from 3 to 64 cells, got 65"),
         ({"prefix": "median"}, ValueError, "prefix"),
         ({"c": -1}, ValueError, "`c` must be a finite number >= 0, got -1"),
         ({"beta": float("nan")}, ValueError, "`beta` must be a finite number >= 0, got nan"),
@@ -288,6 +288,57 @@ def test_bad_genomes():
 def test_bad_arguments(arguments, error, message):
     with pytest.raises(error, match=message):
         OvercookedWorkspace(**arguments)
+
+
+@pytest.mark.parametrize("shape", [(33, 33), (34, 33), (33, 34), (64, 64), (3, 64)])
+def test_genomes_of_every_shape(shape):
+    """Genomes are int8 where that holds every slot, as they always were, and int16 beyond."""
+    ws = OvercookedWorkspace(shape)
+    wide = sum(shape) > 67
+    assert ws.genome_dtype == (np.int16 if wide else np.int8)
+    assert ws.lower_bounds.dtype == ws.upper_bounds.dtype == ws.genome_dtype
+    assert ws.upper_bounds[0] == len(ws.rules.slots) - 1 == 2 * sum(shape) - 9
+    rng = np.random.default_rng(0)
+    genomes = ws.sample(3, rng, obstacle_rate=0.02)
+    last = np.r_[ws.upper_bounds[:1], genomes[0, 1:]]  # a station in the last slot
+    genomes[0] = np.where(ws.valid(last[None])[0], last, genomes[0])
+    children = ws.perturb(genomes, 4, rng)
+    keys = ws.key_decoder()
+    for batch in (genomes, children, keys.decode(keys.encode(children), children, rng)):
+        assert batch.dtype == ws.genome_dtype
+        assert ws.valid(batch).all()
+        assert all(np.array_equal(ws.encode(ws.decode(genome)), genome) for genome in batch)
+        assert ws.valid(batch.astype(np.int64)).all()
+        assert not ws.valid(batch.astype(np.int64) + 2**16).any()
+        assert np.array_equal(ws.measures(batch), ws.measures(batch.astype(float)))
+    assert np.array_equal(keys.decode(keys.encode(children), children, rng), children)
+    assert ws.simplifications(genomes[0]).dtype == ws.genome_dtype
+    with pytest.raises(LayoutError, match="gene 0"):
+        ws.decode(genomes[0].astype(np.int64) + 2**16)
+
+
+def test_scores_of_genomes_in_wide_integers_are_those_of_the_layout():
+    ws = OvercookedWorkspace((3, 66 - 2))
+    big = OvercookedWorkspace((40, 40), recipes=[["onion", "fish"]])
+    for workspace, rate in ((ws, 0.0), (big, 0.1)):
+        genomes = workspace.sample(2, np.random.default_rng(1), obstacle_rate=rate)
+        for genome, score, distance in zip(genomes, *workspace.scores(genomes), strict=True):
+            summary = workspace.summary(genome)
+            assert np.isclose(summary["score"], score, rtol=1e-9)
+            assert np.isclose(summary["distance"], distance, rtol=1e-9)
+
+
+def test_archives_of_wide_genomes_lose_nothing():
+    ribs = pytest.importorskip("ribs")
+    from optimizers import make_archive
+
+    assert ribs
+    ws = OvercookedWorkspace((40, 40))
+    archive = make_archive(ws, score_floor=0.0)
+    genomes = ws.sample(5, np.random.default_rng(0), obstacle_rate=0.05)
+    archive.add(genomes, np.arange(5.0), ws.measures(genomes))
+    assert archive.data("solution").dtype == np.int16
+    assert {tuple(row) for row in archive.data("solution")} <= {tuple(row) for row in genomes}
 
 
 def test_no_room():
