@@ -32,12 +32,13 @@ def read_text(path: str | os.PathLike[str]) -> str:
     return decode_text(Path(path).read_bytes(), os.fspath(path))
 
 
-def decode_text(data: bytes, source: str = "the text") -> str:
+def decode_text(data: bytes, source: str = "the text", *, unify: bool = True) -> str:
     r"""Decode UTF-8, or UTF-16 and UTF-32 that begin with a byte-order mark; unify line endings.
 
     Args:
         data: The bytes of a whole text.
         source: What messages call it, such as the path of its file.
+        unify: Whether every line shall end in ``\n`` alone. Quoted text may hold line breaks that have to stay.
 
     Raises:
         ValueError: Bytes of another kind; names ``source``, what was expected and the offending byte with its line.
@@ -51,7 +52,8 @@ def decode_text(data: bytes, source: str = "the text") -> str:
         if b"\0" in data[:4096]:
             raise ValueError(f"{source} is not text: it holds zero bytes; expected text in UTF-8")
     try:
-        return clean_text(data.decode(encoding))
+        text = data.decode(encoding)
+        return clean_text(text) if unify else text.removeprefix("\ufeff")
     except UnicodeDecodeError as error:
         line = data[: error.start].count(b"\n") + 1
         raise ValueError(

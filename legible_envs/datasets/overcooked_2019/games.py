@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +12,7 @@ import numpy.typing as npt
 
 from legible_envs.errors import LayoutError
 from legible_envs.overcooked.layout import OvercookedLayout
-from legible_envs.support.files import write_npz
+from legible_envs.support.files import open_npz, write_npz
 
 if TYPE_CHECKING:
     from legible_envs.overcooked.game.replay import GameArrays
@@ -124,7 +123,7 @@ def read_games(path: Path, layouts: Iterable[str] | None = None) -> list[Recorde
         RecordingsError: The file is damaged, of another kind or schema, or lacks a kitchen asked for.
     """
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with open_npz(path) as file:
             if "kind" not in file or str(file["kind"]) != _KIND:
                 raise RecordingsError(f"{path} does not hold recorded games")
             if int(file["schema"]) != SCHEMA:
@@ -134,12 +133,12 @@ def read_games(path: Path, layouts: Iterable[str] | None = None) -> list[Recorde
             if unknown := [name for name in wanted if name not in known]:
                 raise RecordingsError(f"no recordings of {unknown}; there are {known}")
             found = [entry for name in wanted for entry in _read_kitchen(file, name)]
-    except (OSError, EOFError, KeyError, ValueError, TypeError, zipfile.BadZipFile, LayoutError) as error:
+    except (OSError, KeyError, ValueError, TypeError, LayoutError) as error:
         raise RecordingsError(f"{path} is damaged: {type(error).__name__}: {error}") from error
     return [game for _, game in sorted(found, key=lambda entry: entry[0])]
 
 
-def _read_kitchen(file: Any, name: str) -> list[tuple[int, RecordedGame]]:
+def _read_kitchen(file: Mapping[str, Any], name: str) -> list[tuple[int, RecordedGame]]:
     layout = OvercookedLayout.from_ascii(str(file[f"{name}/layout"]))
     arrays = {field: file[f"{name}/{field}"] for field in _PER_STATE + _PER_TICK}
     pairs, splits = file[f"{name}/pair"], file[f"{name}/split"]
