@@ -35,6 +35,7 @@ _registry: Final = Registry(
     "legible.trajectories",
     {
         "recorded play": "legible_envs.overcooked.human_play:read_played",
+        "overcooked-ai": "legible_envs.datasets.overcooked_ai:read_trajectories",
     },
     ValueError,
 )

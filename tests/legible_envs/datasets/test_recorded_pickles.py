@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from legible_envs.datasets.overcooked_2019 import (
     RecordingsError,
 )
-from legible_envs.datasets.overcooked_2019.unpickle import ADMITTED, read_table
+from legible_envs.datasets.overcooked_ai.unpickle import ADMITTED, read_table
 from tests.legible_envs.datasets.old_pickles import Call, array, dumps, named, table_pickle
 
 
@@ -40,7 +40,7 @@ def test_tables_are_rebuilt_without_their_libraries() -> None:
         b"b",
         state=(1, (2, 2), Call(named("numpy", "dtype"), "i8", 0, 1, state=(3, "<")), True, np.arange(4).tobytes()),
     )
-    from legible_envs.datasets.overcooked_2019.unpickle import _array, _Reader
+    from legible_envs.datasets.overcooked_ai.unpickle import _array, _Reader
 
     assert _array(_Reader(dumps(fortran)).load()).tolist() == [[0, 2], [1, 3]]
     assert _array(_Reader(dumps(array([[True], [False]], "b1"))).load()).tolist() == [[True], [False]]
@@ -86,14 +86,14 @@ def test_hostile_pickles_are_refused_and_nothing_runs(tmp_path: Path) -> None:
 def test_admitted_names_are_never_imported() -> None:
     program = (
         "import sys\n"
-        "from legible_envs.datasets.overcooked_2019.unpickle import ADMITTED, _Reader\n"
+        "from legible_envs.datasets.overcooked_ai.unpickle import ADMITTED, _Reader\n"
         "reader = _Reader(b'')\n"
         "found = [reader.find_class(*name) for name in ADMITTED]\n"
         "assert all(type(f.__new__(f)).__mro__[1].__name__ == '_Record' for f in found)\n"
         "assert 'pandas' not in sys.modules\n"
     )
     subprocess.run([sys.executable, "-c", program], check=True)
-    assert len(ADMITTED) == 8
+    assert len(ADMITTED) == 23
 
 
 @settings(max_examples=300, deadline=None)
