@@ -2,12 +2,13 @@
 
 The rules, for one tick and any number of players:
 
-1. Players who interact do so in their order, with the cell they face. Empty hands take from a station of ingredients
-   or dishes, or what lies on a counter; a counter takes what is held. A pot takes an ingredient while it does not cook
-   and has fewer than three (in 2019: of one kind); a dish takes a soup that is done out of it. Serving takes soups.
+1. Players who interact do so in their order, with the cell they face. Empty hands take from a station of
+   ingredients or dishes, or what lies on a counter; a counter takes what is held. A pot takes an ingredient while it
+   does not cook and has fewer than three (in 2019: of one kind); a dish takes out a soup that is done. Serving takes
+   soups.
 2. Players who move turn, and step where there is floor. If two would share or swap cells, all stay.
-3. Soups that cook do so for another tick. In 2019 a pot cooks when it holds three; in 2020 from when a player with empty
-   hands interacts with it. Recordings of 2019 that are published in the newer form may follow either.
+3. Soups that cook do so for another tick. In 2019 a pot cooks when it holds three; in 2020 once a player with
+   empty hands has interacted with it. Recordings of 2019 that are published in the newer form may follow either.
 """
 
 from __future__ import annotations

@@ -47,6 +47,8 @@ ADMITTED: Final = (
     ("numpy.core.multiarray", "_reconstruct"),
     ("numpy.core.numeric", "_frombuffer"),
     ("builtins", "slice"),
+    ("__builtin__", "slice"),
+    ("_codecs", "encode"),
 )
 """Every name that a table of text and numbers uses, in any pandas since 2019; each is a record, none is imported."""
 
@@ -182,8 +184,20 @@ def _array(record: Any) -> npt.NDArray[Any]:
         flat = np.empty(len(data), dtype=object)
         flat[:] = data
     else:
-        flat = np.frombuffer(data, dtype=_dtype(dtype))
+        flat = np.frombuffer(_bytes(data), dtype=_dtype(dtype))
     return flat.reshape(shape, order="F" if fortran else "C")
+
+
+def _bytes(data: Any) -> bytes:
+    """Bytes; before protocol 3 as a call of ``encode(text, "latin1")``."""
+    if isinstance(data, _Record):
+        text, encoding = _expect(data, "encode").args
+        if encoding != "latin1":
+            raise ValueError("bytes in another encoding than latin1")
+        return bytes(text.encode("latin1"))
+    if not isinstance(data, bytes):
+        raise ValueError(f"expected bytes, got {type(data).__name__}")
+    return data
 
 
 def _dtype(record: Any) -> Any:

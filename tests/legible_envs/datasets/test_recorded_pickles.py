@@ -6,6 +6,7 @@ import os
 import pickle
 import subprocess
 import sys
+import tracemalloc
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from hypothesis import strategies as st
 from legible_envs.datasets.overcooked_2019 import (
     RecordingsError,
 )
+from legible_envs.datasets.overcooked_ai.pickle_sizes import check_sizes
 from legible_envs.datasets.overcooked_ai.unpickle import ADMITTED, read_table
 from tests.legible_envs.datasets.old_pickles import Call, array, dumps, named, table_pickle
 
@@ -93,7 +95,7 @@ def test_admitted_names_are_never_imported() -> None:
         "assert 'pandas' not in sys.modules\n"
     )
     subprocess.run([sys.executable, "-c", program], check=True)
-    assert len(ADMITTED) == 23
+    assert len(ADMITTED) == 25
 
 
 @settings(max_examples=300, deadline=None)
@@ -110,3 +112,98 @@ def test_damaged_pickles_never_do_anything_but_fail(data: st.DataObject) -> None
     for name, column in table.items():
         assert isinstance(name, str)
         assert isinstance(column, np.ndarray)
+
+
+# -- sizes ------------------------------------------------------------------------------------------------------------
+
+HUGE = (2**31 - 1).to_bytes(4, "little"), (2**62).to_bytes(8, "little")
+GREEDY = {
+    "long bytes": (b"\x80\x04\x8e" + HUGE[1], "BINBYTES8 asks for"),
+    "bytes": (b"\x80\x04B" + HUGE[0], "BINBYTES asks for"),
+    "text": (b"\x80\x04X" + HUGE[0] + b"abc", "BINUNICODE asks for"),
+    "long text": (b"\x80\x04\x8d" + HUGE[1] + b"abc.", "BINUNICODE8 asks for"),
+    "buffer": (b"\x80\x05\x96" + HUGE[1] + b"abc.", "BYTEARRAY8 asks for"),
+    "number": (b"\x80\x02\x8b" + HUGE[0] + b".", "LONG4 asks for"),
+    "negative": (b"\x80\x02\x8b\xff\xff\xff\xff.", "a negative length"),
+    "frame": (b"\x80\x04\x95" + HUGE[1] + b"N.", "a frame of"),
+    "kept": (b"\x80\x04Nr" + HUGE[0] + b".", "kept under a number"),
+    "kept as text": (b"Np99999999999\n.", "kept under a number"),
+    "many digits": (b"I" + b"9" * 10_000 + b"\n.", "a number of 10001 digits"),
+    "end": (b"\x80\x04N", "ends too early"),
+    "cut": (b"\x80\x04X\x05", "asks for"),
+    "unknown": (b"\x80\x04\xff.", "no step of a pickle"),
+}
+
+
+@pytest.mark.parametrize("name", GREEDY)
+def test_a_pickle_that_asks_for_more_than_it_fills_is_refused_before_it_is_loaded(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    data, message = GREEDY[name]
+    monkeypatch.setattr("legible_envs.datasets.overcooked_ai.unpickle._Reader", None)
+    with pytest.raises(RecordingsError, match=message):
+        read_table(data)
+
+
+def test_a_small_pickle_cannot_grow() -> None:
+    """References are small, what they stand for is not: long arguments given again and again, one column many times."""
+    long = tuple(range(40))
+    with pytest.raises(RecordingsError, match="with 40 arguments"):
+        read_table(dumps([Call(named("numpy", "ndarray"), *long)]))
+    column = array([["a"] * 1000], "O8")
+    blocks = [{"values": column, "mgr_locs": array([0], "i8")} for _ in range(500)]
+    index = Call(
+        named("pandas.core.indexes.base", "_new_Index"),
+        named("pandas.core.indexes.base", "Index"),
+        {"data": array(["a"], "O8")},
+    )
+    manager = Call(
+        named("pandas.core.internals.managers", "BlockManager"),
+        state=([index], [], [], {"0.14.1": {"blocks": blocks}}),
+    )
+    with pytest.raises(RecordingsError, match="it repeats its columns"):
+        read_table(dumps(Call(named("pandas.core.frame", "DataFrame"), state={"_data": manager})))
+
+
+PLAIN = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers()
+    | st.floats()
+    | st.text()
+    | st.binary()
+    | st.just("a" * 300)
+    | st.just(b"b" * 300),
+    lambda inner: (
+        st.lists(inner) | st.dictionaries(st.text(), inner) | st.tuples(inner, inner) | st.frozensets(st.integers())
+    ),
+    max_leaves=30,
+)
+
+
+@settings(max_examples=200, deadline=None)
+@given(value=PLAIN, protocol=st.integers(0, 5))
+def test_every_honest_pickle_passes(value: Any, protocol: int) -> None:
+    check_sizes(pickle.dumps(value, protocol))
+    check_sizes(pickle.dumps([value, bytearray(b"abc"), {1: value}, range(3), 10**400], protocol))
+
+
+@settings(max_examples=300, deadline=None)
+@given(data=st.data())
+def test_whatever_passes_is_loaded_within_its_own_size(data: st.DataObject) -> None:
+    """No damaged byte makes the unpickler take more than a small multiple of the file."""
+    whole = bytearray(table_pickle({"a": ["x", "y"] * 20, "b": [1.0, 2.0] * 20}))
+    for _ in range(data.draw(st.integers(1, 6))):
+        at = data.draw(st.integers(0, len(whole) - 9))
+        whole[at : at + 8] = data.draw(
+            st.sampled_from([HUGE[1], HUGE[0] * 2, b"\xff" * 8, bytes(8), b"r" + HUGE[0] + b"00N"])
+        )
+    tracemalloc.start()
+    try:
+        read_table(bytes(whole))
+    except RecordingsError:
+        pass
+    finally:
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+    assert peak < 2_000_000
