@@ -5,9 +5,9 @@ from __future__ import annotations
 import codecs
 import os
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
-__all__ = ["clean_text", "decode_text", "read_text"]
+__all__ = ["clean_text", "decode_text", "dump_yaml", "read_text"]
 
 # The longer marks first: UTF-32's begins with UTF-16's.
 _MARKS: Final = (
@@ -65,3 +65,15 @@ def decode_text(data: bytes, source: str = "the text", *, unify: bool = True) ->
 def clean_text(text: str) -> str:
     r"""A text without byte-order mark, every line ending in ``\n`` alone."""
     return text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
+
+
+def dump_yaml(data: Any) -> str:
+    r"""Plain data as YAML that is read back equal, letters of all scripts as they are.
+
+    A next-line character (``\x85``), which PyYAML would write as it is and read as a line break, has all such letters
+    escaped.
+    """
+    import yaml
+
+    text: str = yaml.safe_dump(data, sort_keys=False, allow_unicode=True)
+    return text if "\x85" not in text else yaml.safe_dump(data, sort_keys=False)

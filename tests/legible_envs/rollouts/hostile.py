@@ -36,7 +36,7 @@ TEXTS = st.one_of(st.just(""), NAMES)
 def trajectories(draw: st.DrawFn, grid: bool, names: st.SearchStrategy[str] = NAMES) -> Trajectory:
     count = draw(st.integers(1, 6))
     # distinct neighbours, so that nothing depends on whether waiting is kept
-    number: Any = st.integers(-(2**40), 2**40) if grid else st.floats(-1e9, 1e9)
+    number: Any = st.integers(-(10**9), 10**9) if grid else st.floats(-1e9, 1e9)
     states = draw(st.lists(st.tuples(number, number), min_size=count, max_size=count, unique=True))
     candidates = draw(st.lists(names, min_size=1, max_size=3, unique=True))
     texts = st.one_of(st.just(""), names)

@@ -149,7 +149,7 @@ def changed(dataset: Any, **values: Any) -> None:
 def test_an_episode_that_does_not_play_again_is_refused() -> None:
     for number, (change, message) in enumerate(
         [
-            ({"actions": (7, 9)}, r"episode 0 of .*, step 7: expected an action 0\.\.5, got 9"),
+            ({"actions": (7, 9)}, "episode 0 of .*, step 7: .*9"),
             ({"observations": (5, 3)}, "episode 0 of .* plays otherwise than it was recorded, from step 4 on"),
             ({"rewards": (3, 0.5)}, "step 3 was recorded with reward 0.5 and gives 0 now"),
             ({"observations": (0, 3)}, "begins in none of the states|plays otherwise"),
