@@ -40,8 +40,7 @@ class LayoutKind:
         layout: The class of its layouts; subclasses count.
         to_text: The text of a layout, any number of lines.
         from_text: Reads it; raises :class:`~legible_envs.errors.LayoutError` where it is malformed.
-        to_line: A text without line breaks, for CSV; None takes ``to_text``, whose line breaks CSV quotes. CSV drops
-            blanks at both ends.
+        to_line: A text without line breaks, for CSV; None takes ``to_text``, whose line breaks CSV quotes.
         from_line: Reads that.
         recognises: Whether a line is meant as a layout of this kind where a CSV file names no kind. Only what the line
             itself says counts; the default claims nothing, and files then name the kind.

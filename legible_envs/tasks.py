@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from legible_envs.errors import TaskError
-from legible_envs.support.text import clean_text, read_text
+from legible_envs.support.text import clean_text, dump_yaml, read_text
 from legible_envs.support.validation import entries, integer, shown
 from legible_envs.task_states import StateSpace, SubtaskClass
 
@@ -332,9 +332,7 @@ class TaskGraph:
 
     def to_yaml(self, path: str | Path | None = None) -> str:
         """Return the task as YAML text, and write it to ``path`` if given."""
-        import yaml
-
-        text = yaml.safe_dump(self.to_dict(), sort_keys=False, allow_unicode=True)
+        text = dump_yaml(self.to_dict())
         if path is not None:
             Path(path).write_text(text, encoding="utf-8")
         return text

@@ -188,8 +188,8 @@ def _summed_up(scores: pd.DataFrame) -> dict[str, Any]:
             f"{plural(sum(row[1] for row in rows), 'recorded trajectory')} of real players (Carroll et al., NeurIPS "
             f"2019) in {plural(len(kitchens), 'kitchen')} that were not designed to be legible. Accuracy by share "
             f"observed (in {scores.attrs['cut']}), ties shared out; every dispenser in reach is a candidate. Neither "
-            "predictor has learned anything from these players; chance is a guess among the candidates. The table averages "
-            f"over {fractions[0]:.0%} to {fractions[-1]:.0%}."
+            "predictor has learned anything from these players; chance is a guess among the candidates. The table "
+            f"averages over {fractions[0]:.0%} to {fractions[-1]:.0%}."
         ),
         "fractions": fractions,
         "curves": [{"label": p, "values": [float(curve[p, f]) for f in fractions]} for p in predictors],

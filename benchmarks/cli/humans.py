@@ -88,12 +88,13 @@ def evaluate_predictors(
         predictors=(*PREDICTORS, *(NEURAL if with_networks else ())), layouts=layouts or LAYOUTS, repeats=repeats
     )
     with console.status("") as status:
-        found = {"kitchens": score_recorded_play(folder, experiment, tell=status.update)}
+        pointed = {}
         if pointing is None:
             notes.append("Real pointing was not evaluated: --pointing names its file.")
-        else:
+        else:  # first, so that what is wrong with the file is said before the kitchens take their minutes
             settings = (*POINTING_PREDICTORS, *(POINTING_NEURAL if with_networks else ()))
-            found["pointing"] = score_pointing(pointing, predictors=settings, tell=status.update)
+            pointed["pointing"] = score_pointing(pointing, predictors=settings, tell=status.update)
+        found = {"kitchens": score_recorded_play(folder, experiment, tell=status.update), **pointed}
     for name, scores in found.items():
         _print(console, name, scores, out)
     for note in notes:

@@ -7,12 +7,14 @@ sample: ``participant, condition, trial, target, target_x, target_y, t_ms, x, y`
 from __future__ import annotations
 
 import os
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import Trajectory
+from legible_envs.support.file_kinds import describe_file
+from legible_envs.support.validation import shown
 
 __all__ = ["METRES_PER_PIXEL", "RATE", "load_pointing"]
 
@@ -20,6 +22,7 @@ RATE: Final = 30.0
 """Samples per second after resampling."""
 METRES_PER_PIXEL: Final = 1e-3
 """So that the targets lie 0.3 m away."""
+_MEASURED: Final = ("target_x", "target_y", "t_ms", "x", "y")
 _COLUMNS: Final = ("participant", "condition", "trial", "target", "target_x", "target_y", "t_ms", "x", "y")
 
 
@@ -31,19 +34,19 @@ def load_pointing(path: str | os.PathLike[str]) -> list[Trajectory]:
 
     Raises:
         FileNotFoundError: No such file.
-        ValueError: Columns are missing.
+        ValueError: It is no such table: what it looks like, which columns are missing or doubled, or which row of a
+            column holds no finite number; or a movement without motion.
     """
-    import pandas as pd
-
-    table = pd.read_csv(path)
-    missing = [name for name in _COLUMNS if name not in table]
-    if missing:
-        raise ValueError(f"{os.fspath(path)} is no table of pointing: the columns {missing} are missing")
+    table = _read_table(path)
     targets = table.groupby("target")[["target_x", "target_y"]].first() * METRES_PER_PIXEL
     names = tuple(f"target{number}" for number in targets.index)
     places = tuple(map(tuple, targets.to_numpy().tolist()))
     movements = []
-    for (participant, condition, _), trial in table.groupby(["participant", "condition", "trial"]):
+    for (participant, condition, number), trial in table.groupby(["participant", "condition", "trial"]):
+        if not (trial[["x", "y"]].nunique() > 1).any() or trial["t_ms"].nunique() < 2:
+            raise ValueError(
+                f"{os.fspath(path)}: trial {number} of participant {participant}, condition {condition}, has no motion"
+            )
         times, points = _trimmed(trial["t_ms"].to_numpy() / 1000.0, trial[["x", "y"]].to_numpy(dtype=np.float64))
         clock = np.arange(int((times[-1] - times[0]) * RATE + 1e-6) + 1) / RATE
         states = np.stack([np.interp(times[0] + clock, times, column) for column in points.T], axis=1)
@@ -60,6 +63,38 @@ def load_pointing(path: str | os.PathLike[str]) -> list[Trajectory]:
             )
         )
     return movements
+
+
+def _read_table(path: str | os.PathLike[str]) -> Any:
+    import pandas as pd
+
+    name = os.fspath(path)
+    try:
+        table = pd.read_csv(path)
+    except FileNotFoundError:
+        raise
+    except Exception as error:  # whatever pandas and the archives it opens may raise on a file of another kind
+        raise ValueError(
+            f"{name} is no table of pointing: it looks like {describe_file(name)}; expected CSV (.csv or .csv.gz) with "
+            f"the columns {list(_COLUMNS)}"
+        ) from error
+    if missing := [column for column in _COLUMNS if column not in table]:
+        raise ValueError(
+            f"{name} is no table of pointing: the columns {missing} are missing; it looks like {describe_file(name)}"
+        )
+    # pandas renames a doubled column to "x.1"
+    if doubled := [column for column in _COLUMNS if f"{column}.1" in table]:
+        raise ValueError(f"{name}: the columns {doubled} are there twice")
+    for column in _COLUMNS:
+        bad = table[column].isna().to_numpy()
+        if column in _MEASURED:
+            numbers = pd.to_numeric(table[column], errors="coerce").to_numpy(dtype=np.float64)
+            bad = ~np.isfinite(numbers)
+        if bad.any():
+            row = int(np.flatnonzero(bad)[0])
+            wanted, found = "a finite number" if column in _MEASURED else "given", table[column].iloc[row]
+            raise ValueError(f"{name}, row {row + 1} of data: {column!r} must be {wanted}, got {shown(found)}")
+    return table.astype(dict.fromkeys(_MEASURED, np.float64))
 
 
 def _trimmed(

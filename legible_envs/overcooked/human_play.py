@@ -21,7 +21,7 @@ from legible_envs.overcooked.layout import INGREDIENTS, OvercookedLayout
 from legible_envs.overcooked.layouts import read_kitchen
 from legible_envs.overcooked.reach import reach_of
 from legible_envs.overcooked.recipes import PAPER_SOUPS, Recipe, check_recipes
-from legible_envs.support.files import write_npz
+from legible_envs.support.files import open_npz, write_npz
 from legible_envs.support.validation import real
 
 if TYPE_CHECKING:
@@ -98,7 +98,7 @@ def load_played(path: str | os.PathLike[str]) -> Played:
         ValueError: The file is something else.
     """
     try:
-        with np.load(path, allow_pickle=False) as arrays:
+        with open_npz(path) as arrays:
             about = json.loads(str(arrays["about"]))
             if about["schema"] != _SCHEMA:
                 raise ValueError(f"schema {about['schema']!r}, expected {_SCHEMA}")

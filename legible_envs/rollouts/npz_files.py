@@ -19,8 +19,7 @@ from __future__ import annotations
 
 import json
 import os
-import zipfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -28,9 +27,10 @@ import numpy as np
 
 from legible_envs.layout_kinds import LayoutKind, kind_named, kind_of
 from legible_envs.rollouts.trajectory import Trajectory
-from legible_envs.support.files import write_npz
+from legible_envs.support.file_kinds import describe_file
+from legible_envs.support.files import open_npz, write_npz
 
-__all__ = ["SCHEMA", "load_trajectories", "save_trajectories"]
+__all__ = ["SCHEMA", "is_npz_of_trajectories", "read_npz", "save_trajectories"]
 
 SCHEMA: Final = 3
 _KIND: Final = "legible-envs trajectories"
@@ -92,26 +92,38 @@ def _least_schema(kinds: Iterable[LayoutKind], records: Iterable[dict[str, Any]]
     return max([positions, *(kind.schema for kind in kinds)])
 
 
-def load_trajectories(path: str | os.PathLike[str]) -> list[Trajectory]:
+def read_npz(path: str | os.PathLike[str]) -> list[Trajectory]:
     """Read trajectories back, equal to those saved and in their order.
 
     Raises:
-        FileNotFoundError: No such file.
+        OSError: The file cannot be read.
         ValueError: Not a file of trajectories, damaged, of a newer schema, or with layouts of a kind that is not known.
     """
-    name = os.fspath(path)
     try:
-        with np.load(path, allow_pickle=False) as file:
-            if not isinstance(file, np.lib.npyio.NpzFile) or "kind" not in file or str(file["kind"]) != _KIND:
-                raise ValueError("it is not a file of trajectories")
-            if int(file["schema"]) > SCHEMA:
-                raise ValueError(f"it has schema {int(file['schema'])}; this version reads up to {SCHEMA}")
+        with open_npz(path) as file:
+            if not _is_ours(file):
+                raise ValueError(f"it looks like {describe_file(path)}")
+            schema = int(file["schema"])
+            if schema > SCHEMA:
+                raise ValueError(f"it has schema {schema}; this version reads up to {SCHEMA}")
             arrays = {key: file[key] for key in ("states", "times", "offsets", "records")}
         return _rebuild(**arrays)
-    except FileNotFoundError:
-        raise
-    except (OSError, EOFError, KeyError, ValueError, TypeError, AttributeError, zipfile.BadZipFile) as error:
-        raise ValueError(f"cannot read trajectories from {name}: {error}") from error
+    except (KeyError, ValueError, TypeError, AttributeError, IndexError, RecursionError) as error:
+        missing = f"it has no {error}" if isinstance(error, KeyError) else error
+        raise ValueError(f"cannot read trajectories from {os.fspath(path)}: {missing}") from error
+
+
+def is_npz_of_trajectories(path: str | os.PathLike[str]) -> bool:
+    """Whether a file says that it holds trajectories; it may be damaged all the same."""
+    try:
+        with open_npz(path) as file:
+            return _is_ours(file)
+    except ValueError:
+        return False
+
+
+def _is_ours(file: Mapping[str, Any]) -> bool:
+    return "kind" in file and str(file["kind"]) == _KIND
 
 
 def _rebuild(states: Any, times: Any, offsets: Any, records: Any) -> list[Trajectory]:

@@ -28,6 +28,8 @@ class Episode:
         rewards: ``T``.
         terminations: ``T``.
         truncations: ``T``.
+        participant: Who played.
+        condition: Under which condition.
     """
 
     seed: int | None = None
@@ -37,6 +39,8 @@ class Episode:
     rewards: list[float] = field(default_factory=list)
     terminations: list[bool] = field(default_factory=list)
     truncations: list[bool] = field(default_factory=list)
+    participant: str = ""
+    condition: str = ""
 
     def __len__(self) -> int:
         return len(self.actions)
@@ -81,10 +85,12 @@ class RecordTrajectories(gym.Wrapper, gym.utils.RecordConstructorArgs):  # type:
     @property
     def episodes(self) -> list[Episode]:
         """The episodes with at least one step in order, the running one last."""
+        self._sign()
         return [episode for episode in self._episodes if len(episode)]
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Keep the trajectories of the episode that ends, and begin another."""
+        self._sign()
         present = self._present()
         observation, info = self.env.reset(seed=seed, options=options)
         self._past += present
@@ -106,6 +112,15 @@ class RecordTrajectories(gym.Wrapper, gym.utils.RecordConstructorArgs):  # type:
     def trajectories(self) -> list[Trajectory]:
         """The trajectories of all episodes in order, the running one's too."""
         return [*self._past, *self._present()]
+
+    def labels(self, episode: Episode) -> dict[str, Any]:
+        """The arguments of the environment's ``trajectories`` with which those of an episode were made."""
+        return {"participant": episode.participant, "condition": episode.condition, **self._options}
+
+    def _sign(self) -> None:
+        """Who plays now has played the running episode."""
+        if self._episodes:
+            self._episodes[-1].participant, self._episodes[-1].condition = self.participant, self.condition
 
     def _present(self) -> list[Trajectory]:
         found: list[Trajectory] = self._game.trajectories(

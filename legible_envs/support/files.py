@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Callable, Mapping
+import zipfile
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 
-__all__ = ["remove_leftovers", "write_atomically", "write_npz", "write_text"]
+from legible_envs.support.file_kinds import describe_file, is_zip
+
+__all__ = ["open_npz", "remove_leftovers", "write_atomically", "write_npz", "write_text"]
 
 _MARK = ".part-"
 
@@ -60,6 +63,29 @@ def write_npz(path: str | os.PathLike[str], arrays: Mapping[str, Any]) -> None:
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     write_atomically(path, lambda stream: np.savez_compressed(stream, allow_pickle=False, **arrays))
+
+
+@contextlib.contextmanager
+def open_npz(path: str | os.PathLike[str]) -> Iterator[Mapping[str, Any]]:
+    """The arrays of an ``.npz``, read when they are looked up; pickles in it are never loaded.
+
+    Raises:
+        OSError: The file cannot be read.
+        ValueError: It is no ``.npz``, with what it looks like; or, where an array is looked up, damaged or a pickle.
+    """
+    try:
+        if not is_zip(path):
+            raise ValueError(f"it looks like {describe_file(path)}, and is no .npz")
+        with np.load(path, allow_pickle=False) as arrays:
+            yield arrays
+    except (OSError, zipfile.BadZipFile, EOFError, MemoryError) as error:
+        if isinstance(error, OSError) and error.errno is not None:
+            raise
+        raise ValueError(f"it is a damaged or incomplete .npz ({error or type(error).__name__})") from error
+    except ValueError as error:
+        if "allow_pickle" in str(error):
+            raise ValueError("it holds pickled objects, which are never loaded") from error
+        raise
 
 
 def remove_leftovers(folder: Path) -> None:

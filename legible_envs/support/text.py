@@ -5,9 +5,9 @@ from __future__ import annotations
 import codecs
 import os
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
-__all__ = ["clean_text", "decode_text", "read_text"]
+__all__ = ["clean_text", "decode_text", "dump_yaml", "read_text"]
 
 # The longer marks first: UTF-32's begins with UTF-16's.
 _MARKS: Final = (
@@ -32,12 +32,13 @@ def read_text(path: str | os.PathLike[str]) -> str:
     return decode_text(Path(path).read_bytes(), os.fspath(path))
 
 
-def decode_text(data: bytes, source: str = "the text") -> str:
+def decode_text(data: bytes, source: str = "the text", *, unify: bool = True) -> str:
     r"""Decode UTF-8, or UTF-16 and UTF-32 that begin with a byte-order mark; unify line endings.
 
     Args:
         data: The bytes of a whole text.
         source: What messages call it, such as the path of its file.
+        unify: Whether every line shall end in ``\n`` alone. Quoted text may hold line breaks that have to stay.
 
     Raises:
         ValueError: Bytes of another kind; names ``source``, what was expected and the offending byte with its line.
@@ -47,7 +48,8 @@ def decode_text(data: bytes, source: str = "the text") -> str:
     if not mark and b"\0" in data[:4096]:
         raise ValueError(f"{source} is not text: it holds zero bytes; expected text in UTF-8")
     try:
-        return clean_text(data.decode(encoding))
+        text = data.decode(encoding)
+        return clean_text(text) if unify else text.removeprefix("\ufeff")
     except UnicodeDecodeError as error:
         line = data[: error.start].count(b"\n") + 1
         raise ValueError(
@@ -59,3 +61,15 @@ def decode_text(data: bytes, source: str = "the text") -> str:
 def clean_text(text: str) -> str:
     r"""A text without byte-order mark, every line ending in ``\n`` alone."""
     return text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
+
+
+def dump_yaml(data: Any) -> str:
+    r"""Plain data as YAML that is read back equal, letters of all scripts as they are.
+
+    A next-line character (``\x85``), which PyYAML would write as it is and read as a line break, has all such letters
+    escaped.
+    """
+    import yaml
+
+    text: str = yaml.safe_dump(data, sort_keys=False, allow_unicode=True)
+    return text if "\x85" not in text else yaml.safe_dump(data, sort_keys=False)

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.errors import LayoutError, TaskError
-from legible_envs.support.text import clean_text, read_text
+from legible_envs.support.text import clean_text, dump_yaml, read_text
 from legible_envs.support.validation import shown
 from legible_envs.tabletop.layout import TabletopLayout
 from legible_envs.tabletop.objects import Point, point, rectangle, rectangles_overlap
@@ -139,13 +139,13 @@ class TabletopTask:
 
         Args:
             data: ``name``, ``objects``, ``task`` (see :meth:`~legible_envs.tasks.TaskGraph.from_dict`), and optionally
-                ``table``, ``configuration`` and ``schema`` (1).
+                ``table``, ``obstacles``, ``configuration`` and ``schema`` (1).
 
         Raises:
             TaskError: A missing or unknown key, or data that this class or the graph rejects.
             LayoutError: Data that the layout rejects.
         """
-        keys = {"schema", "name", "table", "objects", "configuration", "task"}
+        keys = {"schema", "name", "table", "objects", "obstacles", "configuration", "task"}
         if not isinstance(data, Mapping):
             raise TaskError(f"a task must be a mapping with the keys {sorted(keys)}, got {type(data).__name__}")
         unknown = sorted(str(key) for key in data if key not in keys)
@@ -153,11 +153,12 @@ class TabletopTask:
         if unknown or missing:
             raise TaskError(
                 f"the task has missing keys {missing} and unknown keys {unknown}; required: name, objects, task, "
-                "optional: schema, table, configuration"
+                "optional: schema, table, obstacles, configuration"
             )
         if data.get("schema", _SCHEMA) != _SCHEMA:
             raise TaskError(f"expected a task with `schema` {_SCHEMA}, got {data['schema']!r}")
-        layout = TabletopLayout.from_dict({"schema": 1, "objects": data["objects"], "table": data.get("table") or {}})
+        arrangement = {"schema": 1, "objects": data["objects"], "obstacles": data.get("obstacles") or []}
+        layout = TabletopLayout.from_dict({**arrangement, "table": data.get("table") or {}})
         return cls(data["name"], layout, TaskGraph.from_dict(data["task"]), data.get("configuration") or {})
 
     def to_dict(self) -> dict[str, Any]:
@@ -168,6 +169,7 @@ class TabletopTask:
             "name": self.name,
             "table": layout["table"],
             "objects": layout["objects"],
+            **({"obstacles": layout["obstacles"]} if layout["obstacles"] else {}),
             "configuration": {name: list(at) for name, at in self.configuration.items()},
             "task": self.graph.to_dict(),
         }
@@ -196,9 +198,7 @@ class TabletopTask:
 
     def to_yaml(self, path: str | Path | None = None) -> str:
         """Return the task as YAML text, and write it to ``path`` if given."""
-        import yaml
-
-        text = yaml.safe_dump(self.to_dict(), sort_keys=False, allow_unicode=True)
+        text = dump_yaml(self.to_dict())
         if path is not None:
             Path(path).write_text(text, encoding="utf-8")
         return text

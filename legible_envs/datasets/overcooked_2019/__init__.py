@@ -16,8 +16,8 @@ from typing import Any, Final, Literal
 
 from platformdirs import user_cache_path
 
-from legible_envs.datasets.overcooked_2019.games import RecordedGame, RecordingsError, read_games, write_games
-from legible_envs.datasets.overcooked_2019.source import Progress
+from legible_envs.datasets.overcooked_2019.games import read_games, write_games
+from legible_envs.datasets.overcooked_ai.games import Progress, RecordedGame, RecordingsError
 from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.rollouts.trajectory import Trajectory
 
@@ -75,10 +75,10 @@ def fetch_recordings(
         RecordingsError: No index can be reached, or the file is any other file. Earlier files stay as they are.
         OSError: The folder cannot be written to.
     """
-    from legible_envs.datasets.overcooked_2019.convert import convert_tables
     from legible_envs.datasets.overcooked_2019.source import SHA256, download_archive, read_archive, read_members
-    from legible_envs.datasets.overcooked_2019.trajectories import all_trajectories
-    from legible_envs.datasets.overcooked_2019.unpickle import read_table
+    from legible_envs.datasets.overcooked_ai.tables_2019 import convert_tables
+    from legible_envs.datasets.overcooked_ai.trajectories import all_trajectories
+    from legible_envs.datasets.overcooked_ai.unpickle import read_table
     from legible_envs.rollouts.npz_files import save_trajectories
 
     place = recordings_folder(folder)
@@ -160,7 +160,7 @@ def recorded_trajectories(
     Raises:
         RecordingsError: The games are not there, or damaged; the message says how to get them.
     """
-    from legible_envs.datasets.overcooked_2019.trajectories import trajectories_of_games
+    from legible_envs.datasets.overcooked_ai.trajectories import trajectories_of_games
 
     return trajectories_of_games(
         load_recorded_games(folder, layouts),
@@ -182,6 +182,6 @@ def recording_stats(folder: str | os.PathLike[str] | None = None) -> list[dict[s
     Raises:
         RecordingsError: The games are not there, or damaged; the message says how to get them.
     """
-    from legible_envs.datasets.overcooked_2019.trajectories import statistics
+    from legible_envs.datasets.overcooked_ai.trajectories import statistics
 
     return statistics(load_recorded_games(folder))

@@ -15,15 +15,15 @@ import ssl
 import subprocess
 import sys
 import tarfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from legible_envs.datasets.overcooked_2019.games import RecordingsError
+from legible_envs.datasets.overcooked_ai.games import Progress, RecordingsError
 
-__all__ = ["PipSettings", "Progress", "download_archive", "read_archive", "read_members"]
+__all__ = ["PipSettings", "download_archive", "read_archive", "read_members"]
 
 PACKAGE: Final = "overcooked-ai"
 VERSION: Final = "1.1.0"
@@ -39,9 +39,6 @@ MEMBERS: Final = {
 
 _TIMEOUT: Final = 15.0
 _OFFLINE: Final = f"Get {FILE_NAME} on a machine with access, and give it with `legible humans fetch --from FILE`."
-
-Progress = Callable[[str, int, int], None]
-"""Called with (what is being done, units done, units in all)."""
 
 
 @dataclass(frozen=True, slots=True)

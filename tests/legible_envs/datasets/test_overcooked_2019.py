@@ -81,7 +81,7 @@ def test_walks_and_counts_of_a_local_copy(published: Path, tmp_path: Path) -> No
 
 
 def test_candidates_of_the_game_are_those_of_the_dynamics(published: Path, tmp_path: Path) -> None:
-    from legible_envs.datasets.overcooked_2019.trajectories import _valid_goals
+    from legible_envs.datasets.overcooked_ai.trajectories import _valid_goals
     from legible_envs.overcooked.game.goals import find_goals
     from legible_envs.overcooked.game.replay import _pack
     from legible_envs.overcooked.game.rules import OVERCOOKED_AI_2019, pack_kitchen, pack_rules
@@ -117,7 +117,7 @@ def test_candidates_of_the_game_are_those_of_the_dynamics(published: Path, tmp_p
     ],
 )
 def test_rows_that_are_no_ticks_are_named(tables: dict[str, Any], column: str, value: str, message: str) -> None:
-    from legible_envs.datasets.overcooked_2019.convert import convert_tables
+    from legible_envs.datasets.overcooked_ai.tables_2019 import convert_tables
 
     table = {key: np.array(values, dtype=object) for key, values in tables["test"].items()}
     table["time_elapsed"] = table["time_elapsed"].astype(float)

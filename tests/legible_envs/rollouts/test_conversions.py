@@ -8,8 +8,6 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import legible_envs  # noqa: F401
 from legible_envs.errors import LayoutError
@@ -19,120 +17,15 @@ from legible_envs.overcooked.policies import ScriptedPlayer
 from legible_envs.overcooked.trajectories import trajectories_from_views
 from legible_envs.rollouts import (
     RecordTrajectories,
-    Trajectory,
     read_any,
-    read_csv,
     record_episode,
     save_trajectories,
     to_minari,
-    write_csv,
 )
 from legible_envs.tabletop import TableObject, TabletopLayout, VirtualObstacle
 
 KITCHEN = OvercookedLayout.from_ascii("XOXTX\nX   X\nX   D\nX 1 X\nXXSPX")
 TABLE = TabletopLayout([TableObject("a cup, red", (0.1 + 0.2, 0.5))], [VirtualObstacle((0.4, 0.2), 1 / 3)])
-NAMES = st.text(
-    st.characters(exclude_characters=";\x00\r\n", exclude_categories=["Cs", "Cc", "Zs"]), min_size=1, max_size=5
-)
-
-
-@st.composite
-def trajectories(draw: st.DrawFn, grid: bool) -> Trajectory:
-    count = draw(st.integers(1, 6))
-    number = st.integers(0, 9) if grid else st.floats(-2, 2, allow_subnormal=False)
-    states = draw(st.lists(st.tuples(number, number), min_size=count, max_size=count))
-    names = draw(st.lists(NAMES, min_size=1, max_size=3, unique=True))
-    return Trajectory(
-        np.array(states, dtype=int if grid else float),
-        times=np.cumsum(draw(st.lists(st.floats(0, 3), min_size=count, max_size=count))),
-        start=draw(st.sampled_from(["", "pot", 'a "quoted", name'])),
-        goal=draw(st.sampled_from([None, *names])),
-        candidates=tuple(names),
-        participant=draw(st.sampled_from(["", "p1", "Zoë"])),
-        condition=draw(st.sampled_from(["", "legible"])),
-        layout=draw(st.sampled_from([None, KITCHEN, TABLE])),
-        layout_name=draw(st.sampled_from(["", "home, sweet"])),
-        candidate_set=draw(st.sampled_from(["task", "game", "all"])),
-        complete=draw(st.booleans()),
-        goal_positions=draw(st.sampled_from([None, tuple((0.1 * i, 1e-9) for i in range(len(names)))])),
-    )
-
-
-# -- CSV --------------------------------------------------------------------------------------------------------------
-
-
-@settings(max_examples=60, deadline=None)
-@given(found=st.booleans().flatmap(lambda grid: st.lists(trajectories(grid), max_size=5)))
-def test_trajectories_survive_csv(tmp_path_factory: pytest.TempPathFactory, found: list[Trajectory]) -> None:
-    path = write_csv(tmp_path_factory.mktemp("csv") / "walks.csv", found)
-    assert read_csv(path) == found
-    assert read_any(path) == found
-
-
-def test_csv_of_other_people_needs_little(tmp_path: Path) -> None:
-    path = tmp_path / "t.csv"
-    path.write_text(
-        "\ufefftrajectory,row,col,goal,mood\n7,1,1,onion,good\n7,0,1,onion,bad\nz,1,3,tomato,\nz,0,3,tomato,\n"
-    )
-    first, second = read_csv(path, layout=KITCHEN)
-    assert first == Trajectory([(1, 1), (0, 1)], goal="onion", candidates=("onion", "tomato"), layout=KITCHEN)
-    assert second.goal == "tomato"
-    path.write_text("trajectory,time,x,y,goal,candidates\na,0,.5,1,,left; right\na,.1,.5,1e-1,,left; right\n")
-    (reach,) = read_csv(path)
-    assert (reach.goal, reach.candidates, reach.times.tolist()) == (None, ("left", "right"), [0.0, 0.1])
-    assert not reach.is_grid
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("", "expected columns 'trajectory'"),
-        ("trajectory,goal\na,b\n", "row, col"),
-        ("trajectory,y,goal\na,1,b\n", "row, col"),
-        ("row,col,goal\n1,1,b\n", "'trajectory'"),
-        ("trajectory,row,col,goal\na,1,x,b\n", "trajectory 'a': line 2: 'col' must be a whole number, got 'x'"),
-        ("trajectory,x,goal\na,1,b\na,,b\n", "line 3: 'x' must be a number, got ''"),
-        ("trajectory,x,goal\na,nan,b\n", "must be finite"),
-        ("trajectory,x,goal\na,1,b\na,2,c\n", "line 3: 'goal' differs from line 2"),
-        ("trajectory,x,goal\na,1,b\nc,1,b\na,2,b\n", "line 4: rows of trajectory 'a' are not together"),
-        ("trajectory,x,time,goal\na,1,0,b\na,1,,b\n", "line 3: no time"),
-        ("trajectory,x,time,goal\na,1,1,b\na,1,0,b\n", "never decrease"),
-        ("trajectory,x,goal,candidates\na,1,b,c;d\n", "not among the candidates"),
-        ("trajectory,x,goal,positions\na,1,b,1;x\n", "line 2: 'positions' must be numbers"),
-        ("trajectory,x,goal,positions\na,1,b,1;2\n", "one finite position for each of 1"),
-        ("trajectory,x,goal,complete\na,1,b,yes\n", "0 or 1"),
-        ("trajectory,x,goal,candidate_set\na,1,b,none\n", "candidate_set"),
-        ("trajectory,row,col,goal,layout\na,1,1,b,XX/X\n", "row"),
-    ],
-)
-def test_bad_csv_is_refused_with_its_line(tmp_path: Path, text: str, message: str) -> None:
-    path = tmp_path / "bad.csv"
-    path.write_text(text)
-    with pytest.raises(ValueError, match=message) as caught:
-        read_csv(path)
-    assert "bad.csv" in str(caught.value)
-
-
-def test_what_csv_cannot_hold_is_refused_and_the_old_file_stays(tmp_path: Path) -> None:
-    path = write_csv(tmp_path / "w.csv", [Trajectory([(1, 1)], candidates=("a",))])
-    before = path.read_bytes()
-    cell = Trajectory([(1, 1)], candidates=("a",))
-    for bad, message in (
-        ([cell, Trajectory([(1.0, 1.0)], candidates=("a",))], "one kind"),
-        ([cell.first(0)], "has no states"),
-        ([Trajectory([(1, 1)], candidates=("a;b",))], "';'"),
-        ([Trajectory([(1.0,) * 4], candidates=("a",))], "1 to 3"),
-    ):
-        with pytest.raises(ValueError, match=message):
-            write_csv(path, bad)
-        assert path.read_bytes() == before
-    with pytest.raises(FileNotFoundError):
-        read_csv(tmp_path / "none.csv")
-    path.write_bytes(b"\xff\xfe\x00\x01")
-    with pytest.raises(ValueError, match="not a CSV"):
-        read_csv(path)
-
-
 # -- episodes ---------------------------------------------------------------------------------------------------------
 
 

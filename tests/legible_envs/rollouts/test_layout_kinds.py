@@ -97,7 +97,7 @@ def test_a_malformed_layout_of_another_package_is_named(tmp_path: Path) -> None:
     register_layout_kind(SHELF)
     path = tmp_path / "w.csv"
     path.write_text("trajectory,x,goal,layout,layout_kind\na,1,b,cupboard,shelf\n")
-    with pytest.raises(ValueError, match=r"w\.csv, trajectory 'a': no shelf: 'cupboard'"):
+    with pytest.raises(ValueError, match=r"w\.csv, line 2: trajectory 'a': no shelf: 'cupboard'"):
         read_csv(path)
 
 

@@ -142,7 +142,7 @@ def test_unreadable_files_are_refused_in_words(tmp_path: Path) -> None:
             load_trajectories(tmp_path / name)
     for change, message in (
         ({"schema": 99}, "schema 99"),
-        ({"kind": "cake"}, "not a file of trajectories"),
+        ({"kind": "cake"}, "it looks like an .npz with the arrays .*; expected"),
         ({"offsets": np.array([0, 5])}, "offsets"),
         ({"records": np.frombuffer(b"{}", dtype=np.uint8)}, "layouts"),
     ):

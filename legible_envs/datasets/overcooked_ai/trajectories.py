@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from legible_envs.datasets.overcooked_2019.games import RecordedGame
+from legible_envs.datasets.overcooked_ai.games import RecordedGame
 from legible_envs.overcooked.trajectories import dispensers_in_reach, trajectories
 from legible_envs.rollouts.trajectory import Trajectory
 from legible_envs.support.validation import choice
@@ -27,18 +27,35 @@ def all_trajectories(games: Sequence[RecordedGame]) -> list[Trajectory]:
 def trajectories_of_games(
     games: Sequence[RecordedGame], candidate_set: Literal["game", "all"] = "all", **limits: Any
 ) -> list[Trajectory]:
-    """Trajectories of games; see :func:`legible_envs.datasets.overcooked_2019.recorded_trajectories`."""
+    """The trajectories of the persons in games, not those of other agents.
+
+    Args:
+        games: Games of :func:`.read_recording` or :func:`.load_recorded_games`.
+        candidate_set: ``"all"``: every dispenser in reach. ``"game"``: those among them that are of use when the
+            trajectory begins; known for games by the rules of 2019 alone.
+        **limits: ``min_positions``, ``min_candidates`` and ``round_trips``, as in
+            :func:`legible_envs.datasets.overcooked_2019.recorded_trajectories`; by default all trajectories are kept.
+
+    Raises:
+        ValueError: Unknown candidates, or those of the game where its rules are others.
+    """
     choice("candidate_set", candidate_set, ("game", "all"))
+    other = [game for game in games if game.rules != "overcooked-ai-2019"] if candidate_set == "game" else []
+    if other:
+        raise ValueError(
+            f"which goals are of use is known by the rules of 2019 alone; the game {other[0].pair} of "
+            f'{other[0].layout_name} has other orders and pots: take `candidate_set="all"`'
+        )
     return [
         found
         for game in games
         for found in trajectories(
             game.layout,
-            game.cells,
-            game.facing,
-            game.held,
+            game.cells[:, game.people],
+            game.facing[:, game.people],
+            game.held[:, game.people],
             game.seconds.astype(np.float64),
-            participants=[game.participant(player) for player in range(game.num_players)],
+            participants=[game.participant(player) for player in game.people],
             valid_goals=_valid_goals(game) if candidate_set == "game" else None,
             condition="recorded",
             layout_name=game.layout_name,
@@ -51,7 +68,8 @@ def _valid_goals(game: RecordedGame) -> Callable[[int, int], Collection[str]]:
     """Goals of use to empty hands in the 2019 game: the rule of ``legible_envs.overcooked.game.goals``."""
     full = game.pots[:, :, :4].sum(axis=2) >= _FULL
 
-    def valid(tick: int, player: int) -> Collection[str]:
+    def valid(tick: int, person: int) -> Collection[str]:
+        player = game.people[person]
         reach = _pots_in_reach(game, game.cells[tick, player])
         soups = int((full[tick] & reach).sum()) - int((np.delete(game.held[tick], player) == _DISH).sum())
         wanted = {"onion"} if (reach & ~full[tick]).any() else set()
