@@ -34,7 +34,7 @@ $(VENV)/.run-installed: $(LOCKED) pyproject.toml | $(BIN)/python
 $(VENV)/.test-installed: $(LOCKED) pyproject.toml | $(BIN)/python
 	@echo "Installing the test environment into $(VENV) (pinned versions) ..."
 	$(if $(TORCH),$(PIP) $(TORCH))
-	$(PIP) -c $(LOCKED) -e '.[dev,distributed,docs,minari]'
+	$(PIP) -c $(LOCKED) -e '.[dev,distributed,docs,minari,rl]'
 	$(PIP) -c $(LOCKED) --no-deps $(EXAMPLES:%=-e %)
 	@touch $@ $(VENV)/.run-installed
 
@@ -79,7 +79,7 @@ bench: $(VENV)/.run-installed
 lock: | $(BIN)/python
 	$(PIP) uv
 	$(BIN)/uv pip compile --quiet --universal --upgrade --python-version 3.11 --no-emit-index-url --no-emit-find-links \
-	  --no-header --no-annotate pyproject.toml --extra dev --extra distributed --extra minari --extra docs -o $(LOCKED)
+	  --no-header --no-annotate pyproject.toml --extra dev --extra distributed --extra minari --extra rl --extra docs -o $(LOCKED)
 	echo "torch==2.13.0" >> $(LOCKED)
 
 # make clean   remove environments, caches and runs

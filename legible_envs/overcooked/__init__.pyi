@@ -1,5 +1,6 @@
 from .design.workspace import OvercookedWorkspace
 from .layout import OvercookedLayout
+from .learners import as_sb3
 from .recipes import PAPER_SOUPS, soup_task
 from .scoring.scorer import OvercookedScorer
 
@@ -8,5 +9,6 @@ __all__ = [
     "OvercookedLayout",
     "OvercookedScorer",
     "OvercookedWorkspace",
+    "as_sb3",
     "soup_task",
 ]

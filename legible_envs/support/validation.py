@@ -12,7 +12,19 @@ from typing import Any, Literal, TypeVar
 
 import numpy as np
 
-__all__ = ["LARGEST", "choice", "entries", "flag", "integer", "integers", "is_integer", "is_real", "real", "shown"]
+__all__ = [
+    "LARGEST",
+    "choice",
+    "entries",
+    "flag",
+    "integer",
+    "integers",
+    "is_integer",
+    "is_masked",
+    "is_real",
+    "real",
+    "shown",
+]
 
 T = TypeVar("T")
 Closed = Literal["both", "left", "right", "neither"]
@@ -42,6 +54,11 @@ def is_real(value: object) -> bool:
 def is_integer(value: object) -> bool:
     """Whether a value is an int or a numpy integer; no bool, and no float even if it is whole."""
     return isinstance(value, int | np.integer) and not isinstance(value, bool)
+
+
+def is_masked(value: object) -> bool:
+    """Whether a value is a numpy array with masked entries: numbers that somebody has marked as missing."""
+    return isinstance(value, np.ma.MaskedArray) and bool(np.ma.is_masked(value))
 
 
 def real(
