@@ -146,8 +146,8 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
     of any numeric type with whole values, or None, which keeps the one there is. So `ws.sample(num_envs, rng)` gives
     each environment its own. An array of shape `(H, W)` is one kitchen's cells, `(n, d)` holds genomes, `(n, H, W)`
     cells; `d` is larger than `W` in every shape. The autoreset mode is given as
-    `make_vec(id, num_envs, autoreset_mode="same_step")` to the batched kitchen, and as
-    `vector_kwargs={"autoreset_mode": "same_step"}` with `"sync"` and `"async"`.
+    `make_vec(id, num_envs, autoreset_mode="SameStep")` to the batched kitchen, and as
+    `vector_kwargs={"autoreset_mode": "SameStep"}` with `"sync"` and `"async"`.
 
     ## Arguments
 

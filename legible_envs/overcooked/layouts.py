@@ -246,7 +246,7 @@ def read_layout(value: Any, shape: tuple[int, int]) -> OvercookedLayout:
         layout = OvercookedLayout.from_ascii(value)
     elif isinstance(value, Sequence) and value and all(isinstance(row, str) for row in value):
         layout = OvercookedLayout.from_rows(value)
-    elif isinstance(value, Sequence | np.ndarray) and len(value):
+    elif (isinstance(value, Sequence) and value) or (isinstance(value, np.ndarray) and value.ndim and len(value)):
         layout = _read_array(value, shape)
     else:
         raise LayoutError(

@@ -32,7 +32,7 @@ class StableBaselinesVecEnv(VecEnv):
         self._actions: npt.NDArray[Any] = np.empty(0, dtype=np.int64)
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
-        """Set the seeds of the next reset: ``seed + i`` in game ``i``; None draws new ones, from no global generator."""
+        """Set the seeds of the next reset: ``seed + i`` in game ``i``; None draws new ones from no global state."""
         if seed is None:
             seed = int(np.random.default_rng().integers(2**32))
         return super().seed(seed)
@@ -117,9 +117,7 @@ class StableBaselinesVecEnv(VecEnv):
             return list(self.envs.action_masks())
         return [getattr(self.envs.game(i), method_name)(*args, **kwargs) for i in self._get_indices(indices)]
 
-    def env_is_wrapped(
-        self, wrapper_class: type[Any], indices: Indices = None
-    ) -> list[bool]:
+    def env_is_wrapped(self, wrapper_class: type[Any], indices: Indices = None) -> list[bool]:
         """No game is wrapped."""
         return [False for _ in self._get_indices(indices)]
 

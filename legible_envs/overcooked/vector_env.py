@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import partial
 from typing import Any, Final
 
@@ -335,11 +336,11 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
         return known[id(value)]
 
     def _read_actions(self, actions: Any) -> npt.NDArray[np.int64]:
-        try:
-            moves = np.asarray(actions)
-        except (TypeError, ValueError):  # a list of lists that differ in length, or what has no entries
-            moves = np.empty(0, dtype=object)
-        if moves.shape != (self.num_envs,) or moves.dtype.kind not in "iu" or is_masked(actions):
+        moves = np.empty(0, dtype=object)
+        if not is_masked(actions):
+            with suppress(TypeError, ValueError):  # a list of lists that differ in length, or what is no array
+                moves = np.asarray(actions)
+        if moves.shape != (self.num_envs,) or moves.dtype.kind not in "iu":
             raise ValueError(
                 f"expected {self.num_envs} integer actions, got shape {moves.shape} of {moves.dtype}: {shown(actions)}"
             )

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
-from legible_envs.support.validation import choice, entries, integer, is_integer, shown
+from legible_envs.support.validation import choice, entries, integer, is_integer, is_masked, shown
 
 __all__ = [
     "check_count",
@@ -108,7 +108,7 @@ def read_seeds(seed: object, num_envs: int) -> list[int | None]:
     if is_integer(seed):
         first = integer("seed", seed, 0, math.inf)
         return [first + i for i in range(num_envs)]
-    seeds = entries(seed)
+    seeds = [] if is_masked(seed) else entries(seed)
     if len(seeds) != num_envs:
         raise ValueError(
             f"`seed` must be None, an integer >= 0, or one of these for each of {num_envs} environments, "

@@ -57,7 +57,14 @@ def is_integer(value: object) -> bool:
 
 
 def is_masked(value: object) -> bool:
-    """Whether a value is a numpy array with masked entries: numbers that somebody has marked as missing."""
+    """Whether numbers are masked, that is marked as missing, in a numpy array or in a list of such.
+
+    Example:
+        >>> is_masked(np.ma.array([1, 2], mask=[True, False])), is_masked([0, np.ma.masked]), is_masked(np.zeros(2))
+        (True, True, False)
+    """
+    if isinstance(value, list | tuple):
+        return any(isinstance(entry, np.ma.MaskedArray) and is_masked(entry) for entry in value)
     return isinstance(value, np.ma.MaskedArray) and bool(np.ma.is_masked(value))
 
 

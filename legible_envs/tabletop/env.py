@@ -156,8 +156,8 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
     vectors with `vectorization_mode="sync"` or `"async"`. In all three, `reset(options={"layout": ...})` takes one
     layout for all environments, or a list, tuple or array with one for each: in any form that `layout` takes, or None,
     which keeps the one there is. So `ws.sample(num_envs, rng)`, an array `(n, d)` of genomes, gives each environment
-    its own. The autoreset mode is given as `make_vec(id, num_envs, autoreset_mode="same_step")`, and as
-    `vector_kwargs={"autoreset_mode": "same_step"}` with `"sync"` and `"async"`.
+    its own. The autoreset mode is given as `make_vec(id, num_envs, autoreset_mode="SameStep")`, and as
+    `vector_kwargs={"autoreset_mode": "SameStep"}` with `"sync"` and `"async"`.
 
     ## Arguments
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -107,12 +108,11 @@ class TabletopVectorEnv(JsonSpec, SyncVectorEnv):
         return super().step(self._read_actions(actions))
 
     def _read_actions(self, actions: npt.ArrayLike) -> npt.NDArray[Any]:
-        try:
-            hands = np.asarray(actions)
-        except (TypeError, ValueError):  # a list of lists that differ in length, or what has no entries
-            hands = np.empty(0, dtype=object)
-        shape = (self.num_envs, 2)
-        if hands.shape != shape or hands.dtype.kind not in "biuf" or is_masked(actions) or not np.isfinite(hands).all():
+        hands, shape = np.empty(0, dtype=object), (self.num_envs, 2)
+        if not is_masked(actions):
+            with suppress(TypeError, ValueError):  # a list of lists that differ in length, or what is no array
+                hands = np.asarray(actions)
+        if hands.shape != shape or hands.dtype.kind not in "biuf" or not np.isfinite(hands).all():
             raise ValueError(f"expected actions of shape {shape}, finite numbers, got {shown(actions)}")
         return hands
 

@@ -361,6 +361,64 @@ def test_recorded_actions_play_the_episode_again(case: Case) -> None:
     assert [result[1] for result in again[1:]] == recorded.rewards
 
 
+def test_minari_collects_infos_too(plain: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whole episodes, so that goals come and go; what is read back is what was returned."""
+    minari = pytest.importorskip("minari")
+    pytest.importorskip("jax", reason="Minari's collector needs its extra `create`")
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    arguments = {"partner": "robot"} if plain.env_id == TABLE_ID else {}
+    env = minari.DataCollector(plain.make(**arguments), record_infos=True)
+    results = [episode(env, next(iter(plain.kind.policies.values()))(env), seed) for seed in range(2)]
+    named = env.create_dataset("legible/test-v0", author="a", code_permalink="b", author_email="c", algorithm_name="d")
+    for recorded, played in zip(named.iterate_episodes(), results, strict=True):
+        for name, values in recorded.infos.items():
+            assert np.array_equal(values, [result[-1][name] for result in played])
+        assert set(recorded.infos) == set(played[0][-1])
+    env.close()
+
+
+# -- action masks ------------------------------------------------------------------------------------------------------
+
+
+def test_masks_allow_what_does_something() -> None:
+    """An action that is masked leaves the game as it is; one that is allowed, staying aside, does not."""
+    env = gym.make(KITCHEN_ID, layouts="random", virtual_obstacles="soft")
+    game: Any = env.unwrapped
+    policy, random = KINDS[KITCHEN_ID].policies["scripted"](env), np.random.default_rng(0)
+    observation, info = env.reset(seed=0)
+    for _ in range(60):
+        masks = env.get_wrapper_attr("action_masks")()
+        assert (masks.shape, masks.dtype) == ((6,), np.bool_)
+        assert np.array_equal(masks, info["action_mask"])
+        twins: Any = [copy.deepcopy(game) for _ in range(6)]
+        views = [(twin.step(action), twin.view())[1] for action, twin in enumerate(twins)]
+        assert masks.tolist() == [action == 4 or view != views[4] for action, view in enumerate(views)]
+        action = policy(observation, info) if random.random() < 0.8 else int(random.integers(6))
+        observation, _, over, _, info = env.step(action)
+        if over:
+            observation, info = env.reset()
+
+
+@pytest.mark.parametrize("mode", VECTORS)
+def test_masks_of_vectors_are_those_of_their_environments(mode: str) -> None:
+    envs = gym.make_vec(KITCHEN_ID, num_envs=3, vectorization_mode=mode, layouts="random")
+    try:
+        envs.reset(seed=0)
+        rng = np.random.default_rng(0)
+        for _ in range(30):
+            infos = envs.step(rng.integers(6, size=3))[4]
+            masks = envs.call("action_masks")
+            assert np.array_equal(masks, infos["action_mask"])
+            if mode == "vector_entry_point":
+                assert np.array_equal(envs.action_masks(), masks)
+    finally:
+        envs.close()
+
+
+def test_a_table_offers_no_masks() -> None:
+    assert not gym.make(TABLE_ID).has_wrapper_attr("action_masks")
+
+
 # -- vectors -----------------------------------------------------------------------------------------------------------
 
 

@@ -209,11 +209,11 @@ def test_kitchens_in_batches_take_no_vector_kwargs_and_say_what_to_write() -> No
     """Gymnasium refuses them before any code of ours; the docstrings name the spelling that works."""
     for env_id in IDS:
         with pytest.raises(gym.error.Error, match="only through kwargs"):
-            gym.make_vec(env_id, num_envs=2, vector_kwargs={"autoreset_mode": "same_step"})
+            gym.make_vec(env_id, num_envs=2, vector_kwargs={"autoreset_mode": "SameStep"})
         for mode, arguments in (
-            ("vector_entry_point", {"autoreset_mode": "same_step"}),
-            ("sync", {"vector_kwargs": {"autoreset_mode": "same_step"}}),
-            ("async", {"vector_kwargs": {"autoreset_mode": "same_step"}}),
+            ("vector_entry_point", {"autoreset_mode": "SameStep"}),
+            ("sync", {"vector_kwargs": {"autoreset_mode": "SameStep"}}),
+            ("async", {"vector_kwargs": {"autoreset_mode": "SameStep"}}),
         ):
             envs = gym.make_vec(env_id, num_envs=2, vectorization_mode=mode, max_episode_steps=1, **arguments)
             assert envs.metadata["autoreset_mode"] is gym.vector.AutoresetMode.SAME_STEP
@@ -221,5 +221,5 @@ def test_kitchens_in_batches_take_no_vector_kwargs_and_say_what_to_write() -> No
             assert envs.step(envs.action_space.sample())[4]["_final_info"].all()
             envs.close()
         doc = gym.make(env_id).unwrapped.__doc__
-        assert 'make_vec(id, num_envs, autoreset_mode="same_step")' in doc
-        assert 'vector_kwargs={"autoreset_mode": "same_step"}' in doc
+        assert 'make_vec(id, num_envs, autoreset_mode="SameStep")' in doc
+        assert 'vector_kwargs={"autoreset_mode": "SameStep"}' in doc

@@ -131,7 +131,7 @@ def test_second_objects_wait_for_first_ones_in_the_gripper():
     env = make(partner=Grabber(FIRST[0], speed=0.3))
     env.reset(seed=0)
     for name in FIRST[1:]:
-        result = fetch(env, name)
+        fetch(env, name)
     while env.unwrapped.view().status[0] != "placed":
         assert env.unwrapped.goals == ()
         env.step(np.zeros(2))
