@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
 from functools import partial
 from typing import Any, Final
 
@@ -32,7 +31,7 @@ from legible_envs.overcooked.rendering.board import draw_small, tile_pictures
 from legible_envs.overcooked.settings import NUM_ACTIONS, KitchenSettings, PackedKitchen
 from legible_envs.support.per_env import check_count, read_autoreset_mode, read_reset_mask, read_seeds, read_step_limit
 from legible_envs.support.specs import JsonSpec, check_options
-from legible_envs.support.validation import integer, is_masked, shown
+from legible_envs.support.validation import as_array, integer, shown
 
 __all__ = ["OvercookedVectorEnv"]
 
@@ -336,10 +335,7 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
         return known[id(value)]
 
     def _read_actions(self, actions: Any) -> npt.NDArray[np.int64]:
-        moves = np.empty(0, dtype=object)
-        if not is_masked(actions):
-            with suppress(TypeError, ValueError):  # a list of lists that differ in length, or what is no array
-                moves = np.asarray(actions)
+        moves = actions if type(actions) is np.ndarray else as_array(actions)
         if moves.shape != (self.num_envs,) or moves.dtype.kind not in "iu":
             raise ValueError(
                 f"expected {self.num_envs} integer actions, got shape {moves.shape} of {moves.dtype}: {shown(actions)}"

@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from typing import Any, Literal, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 __all__ = [
     "LARGEST",
+    "as_array",
     "choice",
     "entries",
     "flag",
@@ -66,6 +69,19 @@ def is_masked(value: object) -> bool:
     if isinstance(value, list | tuple):
         return any(isinstance(entry, np.ma.MaskedArray) and is_masked(entry) for entry in value)
     return isinstance(value, np.ma.MaskedArray) and bool(np.ma.is_masked(value))
+
+
+def as_array(value: object) -> npt.NDArray[Any]:
+    """A value as an array; an empty one of objects for masked numbers and what numpy makes no array of.
+
+    Example:
+        >>> as_array([1, 2]).tolist(), as_array([[1], [2, 3]]).shape
+        ([1, 2], (0,))
+    """
+    if not is_masked(value):
+        with suppress(TypeError, ValueError, OverflowError):
+            return np.asarray(value)
+    return np.empty(0, dtype=object)
 
 
 def real(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -17,7 +16,7 @@ from gymnasium.wrappers import TimeLimit
 from legible_envs.errors import LayoutError
 from legible_envs.support.per_env import check_count, read_autoreset_mode, read_reset_mask, read_seeds, read_step_limit
 from legible_envs.support.specs import JsonSpec, check_options
-from legible_envs.support.validation import integer, is_masked, shown
+from legible_envs.support.validation import as_array, integer, shown
 from legible_envs.tabletop.env import TabletopEnv
 from legible_envs.tabletop.settings import layout_entries
 
@@ -108,10 +107,7 @@ class TabletopVectorEnv(JsonSpec, SyncVectorEnv):
         return super().step(self._read_actions(actions))
 
     def _read_actions(self, actions: npt.ArrayLike) -> npt.NDArray[Any]:
-        hands, shape = np.empty(0, dtype=object), (self.num_envs, 2)
-        if not is_masked(actions):
-            with suppress(TypeError, ValueError):  # a list of lists that differ in length, or what is no array
-                hands = np.asarray(actions)
+        hands, shape = as_array(actions), (self.num_envs, 2)
         if hands.shape != shape or hands.dtype.kind not in "biuf" or not np.isfinite(hands).all():
             raise ValueError(f"expected actions of shape {shape}, finite numbers, got {shown(actions)}")
         return hands

@@ -382,7 +382,7 @@ def test_minari_collects_infos_too(plain: Case, tmp_path: Path, monkeypatch: pyt
 
 def test_masks_allow_what_does_something() -> None:
     """An action that is masked leaves the game as it is; one that is allowed, staying aside, does not."""
-    env = gym.make(KITCHEN_ID, layouts="random", virtual_obstacles="soft")
+    env = gym.make(KITCHEN_ID, layout=KINDS[KITCHEN_ID].other, virtual_obstacles="soft")
     game: Any = env.unwrapped
     policy, random = KINDS[KITCHEN_ID].policies["scripted"](env), np.random.default_rng(0)
     observation, info = env.reset(seed=0)
