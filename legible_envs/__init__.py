@@ -27,6 +27,7 @@ def register_environments() -> None:
         register(
             id="LegibleTabletop-v0",
             entry_point="legible_envs.tabletop.env:TabletopEnv",
+            vector_entry_point="legible_envs.tabletop.vector_env:TabletopVectorEnv",
             max_episode_steps=1800,
         )
 

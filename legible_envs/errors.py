@@ -11,11 +11,12 @@ class LayoutError(ValueError):
     """A layout breaks a rule.
 
     Attributes:
-        rule: Short machine-readable name of the broken rule, such as ``"reachable"``.
+        rule: Short machine-readable name of the broken rule, such as ``"reachable"``; empty where it got lost, as in an
+            ``AsyncVectorEnv``, which makes errors of its workers anew from their messages.
         cell: The ``(row, col)`` it is broken at, or None where the rule has no single cell.
     """
 
-    def __init__(self, message: str, *, rule: str, cell: tuple[int, int] | None = None) -> None:
+    def __init__(self, message: str, *, rule: str = "", cell: tuple[int, int] | None = None) -> None:
         super().__init__(message)
         self.rule = rule
         self.cell = cell

@@ -1,6 +1,7 @@
 from .design.workspace import OvercookedWorkspace
 from .kitchen_file import KitchenFile
 from .layout import OvercookedLayout
+from .learners import as_sb3
 from .reach import Reach, reach_of
 from .recipes import PAPER_SOUPS, soup_task
 from .scoring.scorer import OvercookedScorer
@@ -12,6 +13,7 @@ __all__ = [
     "OvercookedScorer",
     "OvercookedWorkspace",
     "Reach",
+    "as_sb3",
     "reach_of",
     "soup_task",
 ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from legible_envs.overcooked.env import OvercookedEnv
 from legible_envs.overcooked.game.snapshot import to_text
@@ -30,6 +31,9 @@ class Games(Protocol):
 
     def goals(self, index: int) -> tuple[str, ...]:
         """Names of the valid goals of a game."""
+
+    def action_masks(self, index: int) -> npt.NDArray[np.bool_]:
+        """``(6,)`` actions that do something in a game."""
 
     def view(self, index: int) -> GameView:
         """A snapshot of a game."""
@@ -82,6 +86,16 @@ class GameOfBatch:
         """Names of the valid goals, in reading order."""
         return self._envs.goals(self._index)
 
+    @property
+    def goal_names(self) -> npt.NDArray[np.str_]:
+        """``(H, W)`` name of each cell as a goal; see :attr:`.OvercookedEnv.goal_names`."""
+        layout = self._envs.view(self._index).layout
+        return np.array(layout.goal_names).reshape(layout.shape)
+
+    def action_masks(self) -> npt.NDArray[np.bool_]:
+        """``(6,)`` actions that do something now, staying always."""
+        return self._envs.action_masks(self._index)
+
     def view(self) -> GameView:
         """A snapshot of the game in words, for drawing."""
         return self._envs.view(self._index)
@@ -101,6 +115,6 @@ class GameOfBatch:
         return draw_game(self.view())
 
     def __getattr__(self, name: str) -> Any:
-        if name in ("settings", "shape", "render_mode", "metadata"):
+        if name in ("settings", "shape", "render_mode", "metadata", "spec"):
             return getattr(self._envs, name)
         raise AttributeError(f"the games of a batch have no attribute {name!r}")

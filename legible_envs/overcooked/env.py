@@ -3,30 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any, Literal
 
 import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 from gymnasium import spaces
+from gymnasium.error import ResetNeeded
 
 from legible_envs.drawing.rendered import Rendered
+from legible_envs.errors import LayoutError
 from legible_envs.overcooked.game import batch
 from legible_envs.overcooked.game.observations import grid_observation, vector_observation
 from legible_envs.overcooked.game.snapshot import make_view, name_goals, to_text
 from legible_envs.overcooked.game.vectors import CROSSINGS, DELIVERIES, STATE_SIZE, Kitchen, Vector
 from legible_envs.overcooked.game.view import GameView
 from legible_envs.overcooked.layout import OvercookedLayout
+from legible_envs.overcooked.layout_batches import layout_entries
 from legible_envs.overcooked.layouts import read_layout
 from legible_envs.overcooked.rendering.board import draw_small
-from legible_envs.overcooked.settings import KitchenSettings, PackedKitchen
+from legible_envs.overcooked.settings import NUM_ACTIONS, KitchenSettings, PackedKitchen, read_action
 from legible_envs.overcooked.trajectories import trajectories_from_states
 from legible_envs.rollouts.trajectory import Trajectory
+from legible_envs.support.per_env import own_entry
 from legible_envs.support.specs import JsonSpec, check_options
 
 __all__ = ["OvercookedEnv"]
-
-NUM_ACTIONS = 6
 
 
 class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
@@ -117,17 +120,33 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
 
     ## Information
 
-    Every `reset` and `step` returns fresh
+    Every `reset` and `step` returns fresh numbers and arrays of fixed shape, so that wrappers can stack, convert and
+    record them:
 
     | Key           | Content |
     | ------------- | ------- |
-    | `goals`       | tuple of str: names of the valid goals, what the player may reach for next in the running game (candidate set `game`): stations and counters where an interaction would bring the game forward, in reading order; counters are `counter@(row,col)` |
-    | `goal_mask`   | `(H, W)` bool: the cells of these goals |
+    | `goal_mask`   | `(H, W)` bool: the cells of the valid goals, what the player may reach for next in the running game (candidate set `game`): stations and counters where an interaction would bring the game forward |
     | `action_mask` | `(6,)` int8: actions that do something (staying always), as `action_space.sample(mask)` takes it |
-    | `layout_id`   | str: twelve hexadecimal digits that identify the kitchen |
+    | `layout_id`   | int: identifies the kitchen; the number that the twelve hexadecimal digits of `layout.layout_id` write, `int(layout.layout_id, 16)` |
     | `num_done`    | int: subtasks done in this episode, here the deliveries |
     | `deliveries`  | int: soups delivered in this episode |
     | `crossings`   | int: steps onto soft virtual obstacles in this episode |
+
+    Names are told when asked for: `env.unwrapped.goals` names the valid goals in reading order (counters are
+    `counter@(row,col)`), `env.unwrapped.goal_names[info["goal_mask"]]` does the same from the mask, and
+    `env.unwrapped.layout` is the kitchen. `env.unwrapped.action_masks()` gives the action mask as bool, as
+    `MaskablePPO` of sb3-contrib asks for it.
+
+    ## Vectors
+
+    `gymnasium.make_vec` makes the batched kitchen `OvercookedVectorEnv` (some millions of steps per second), or a
+    vector of single ones with `vectorization_mode="sync"` or `"async"`. In all three, `reset(options={"layout": ...})`
+    takes one kitchen for all environments, or a list, tuple or array with one for each: a layout, a drawing, a genome
+    of any numeric type with whole values, or None, which keeps the one there is. So `ws.sample(num_envs, rng)` gives
+    each environment its own. An array of shape `(H, W)` is one kitchen's cells, `(n, d)` holds genomes, `(n, H, W)`
+    cells; `d` is larger than `W` in every shape. The autoreset mode is given as
+    `make_vec(id, num_envs, autoreset_mode="SameStep")` to the batched kitchen, and as
+    `vector_kwargs={"autoreset_mode": "SameStep"}` with `"sync"` and `"async"`.
 
     ## Arguments
 
@@ -153,7 +172,8 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
     Raises:
         LayoutError: A kitchen that cannot be read, has another shape, or in which the recipes cannot be cooked; the
             message names row, column and rule.
-        ValueError: Any other bad argument; unknown keys in the options of `reset`.
+        ValueError: Any other bad argument, options of `reset` or actions.
+        ResetNeeded: `step` before the first `reset`.
 
     ## Version History
 
@@ -196,7 +216,7 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
         self._actions = np.zeros(1, dtype=np.int64)
         self._goals = np.zeros(self.settings.shape[0] * self.settings.shape[1], dtype=np.bool_)
         self._log = bytearray()
-        self._goal_names: tuple[str, ...] = ()
+        self._begun = False
         self._observation_shape = self.observation_space.shape
         self._install(self.settings.pack(self.settings.preview()))
 
@@ -210,19 +230,20 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
         Args:
             seed: Seed of the environment's generator; None goes on with the one there is.
             options: ``{"layout": …}`` plays in another kitchen from now on; None as its value returns to the
-                environment's own.
+                environment's own. In a vector, a list or array of kitchens holds one per environment.
 
         Returns:
             ``(observation, info)``.
 
         Raises:
             LayoutError: A bad kitchen; the environment goes on as if it had not been asked.
-            ValueError: Unknown option keys.
+            ValueError: Options that are no mapping, or unknown keys; likewise.
+            gymnasium.error.Error: A seed that is no whole number >= 0; likewise.
         """
-        super().reset(seed=seed)
         asked = check_options(options)
-        if "layout" in asked:
-            self.layout = asked["layout"]
+        chosen = self._read(asked["layout"]) if "layout" in asked else (self._chosen, self._pending)
+        super().reset(seed=seed)
+        self._chosen, self._pending = chosen
         layout = self._chosen or self.settings.layout
         if layout is None:
             assert self.settings.distribution is not None
@@ -231,7 +252,7 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
         mask = np.empty(NUM_ACTIONS, dtype=np.int8)
         batch.begin(self._state, self._kitchen, self._rules, self._goals, mask)
         self._log.clear()
-        self._goal_names = name_goals(self._packed.layout, self._goals)
+        self._begun = True
         if self.render_mode == "human":
             self.render()
         return self._observe(), self._info(mask)
@@ -246,23 +267,18 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
             ``(observation, reward, terminated, truncated, info)``.
 
         Raises:
+            ResetNeeded: Before the first reset.
             ValueError: The action is not an integer 0..5.
         """
-        try:
-            self._actions[0] = action
-            move = self._actions.item()
-            valid = 0 <= move < NUM_ACTIONS and move == action
-        except (TypeError, ValueError, OverflowError):
-            valid = False
-        if not valid:
-            raise ValueError(f"expected an action 0..{NUM_ACTIONS - 1}, got {action!r}")
+        if not self._begun:
+            raise ResetNeeded("Cannot call env.step() before calling env.reset()")
+        move = action if type(action) is int and 0 <= action < NUM_ACTIONS else read_action(action)
+        self._actions[0] = move
         mask = np.empty(NUM_ACTIONS, dtype=np.int8)
         self._log.append(move)
-        reward, over, changed = batch.play(
+        reward, over, _ = batch.play(
             self._state, self._kitchen, self._rules, self.settings.weights, self._actions, self._goals, mask
         )
-        if changed:
-            self._goal_names = name_goals(self._packed.layout, self._goals)
         if self.render_mode == "human":
             self.render()
         return self._observe(), reward, over, False, self._info(mask)
@@ -290,13 +306,19 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
 
     @layout.setter
     def layout(self, value: Any) -> None:
+        self._chosen, self._pending = self._read(value)
+
+    def _read(self, value: Any) -> tuple[OvercookedLayout | None, PackedKitchen | None]:
+        """The kitchen that is asked for, and what the kernels read of it where that has to be made anew."""
+        entries = layout_entries(value, self.settings.shape)
+        if entries is not None:
+            value = own_entry("layout", entries, self, partial(LayoutError, rule="count"))
+            if value is None:
+                return self._chosen, self._pending
         if value is None:
-            self._chosen = None
-            return
+            return None, None
         layout = read_layout(value, self.settings.shape)
-        if layout is not self._packed.layout:
-            self._pending = self.settings.pack(layout)
-        self._chosen = layout
+        return layout, None if layout is self._packed.layout else self.settings.pack(layout)
 
     def _enter(self, layout: OvercookedLayout) -> None:
         """Make a kitchen the one that is played in; staying in the same one costs nothing."""
@@ -308,6 +330,7 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
     def _install(self, packed: PackedKitchen) -> None:
         self._packed = packed
         self._rules, self._kitchen = packed.rules, packed.kitchen
+        self._layout_number = int(packed.layout.layout_id, 16)
         self._state = np.zeros(int(packed.rules[STATE_SIZE]), dtype=np.int32)
 
     def _observe(self) -> npt.NDArray[Any]:
@@ -325,10 +348,9 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
     def _info(self, mask: npt.NDArray[np.int8]) -> dict[str, Any]:
         deliveries = self._state.item(DELIVERIES)
         return {
-            "goals": self._goal_names,
             "goal_mask": self._goals.reshape(self.settings.shape).copy(),
             "action_mask": mask,
-            "layout_id": self._packed.layout.layout_id,
+            "layout_id": self._layout_number,
             "num_done": deliveries,
             "deliveries": deliveries,
             "crossings": self._state.item(CROSSINGS),
@@ -346,8 +368,27 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
 
     @property
     def goals(self) -> tuple[str, ...]:
-        """Names of the valid goals; see ``info["goals"]``."""
-        return self._goal_names
+        """Names of the valid goals, in reading order: those that ``info["goal_mask"]`` marks."""
+        return name_goals(self._packed.layout, self._goals)
+
+    @property
+    def goal_names(self) -> npt.NDArray[np.str_]:
+        """``(H, W)`` name of each cell as a goal, so that ``goal_names[info["goal_mask"]]`` names the valid ones."""
+        return np.array(self._packed.layout.goal_names).reshape(self.settings.shape)
+
+    def action_masks(self) -> npt.NDArray[np.bool_]:
+        """``(6,)`` actions that do something now, staying always; the others would leave the game as it is.
+
+        The name is the one that ``MaskablePPO`` of sb3-contrib calls; ``info["action_mask"]`` says the same as int8.
+
+        Raises:
+            ResetNeeded: Before the first reset.
+        """
+        if not self._begun:
+            raise ResetNeeded("Cannot call env.action_masks() before calling env.reset()")
+        masks = np.empty((1, NUM_ACTIONS), dtype=np.int8)
+        batch.find_all_actions(self._state[None], self._kitchen[None], self._rules, masks)
+        return masks[0].astype(np.bool_)
 
     def trajectories(
         self,

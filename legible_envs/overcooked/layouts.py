@@ -370,9 +370,9 @@ def _read_array(value: Any, shape: tuple[int, int]) -> OvercookedLayout:
         raise LayoutError(f"ragged nested list: {error}", rule="ragged") from error
     if array.dtype.kind == "U" and array.ndim == 2:
         return OvercookedLayout.from_rows(array.tolist())
-    if array.dtype.kind not in "iu" or array.ndim not in (1, 2):
+    if array.dtype.kind not in ("iu" if array.ndim == 2 else "biuf") or array.ndim not in (1, 2):
         raise LayoutError(
-            f"expected a genome (1-D integers) or cells (2-D integers or symbols), got {array.ndim}-D {array.dtype}",
+            f"expected a genome (1-D numbers) or cells (2-D integers or symbols), got {array.ndim}-D {array.dtype}",
             rule="type",
         )
     if array.ndim == 2:

@@ -53,7 +53,7 @@ class ScriptedPlayer:
         count = self.num_envs or 1
         self._height = self._width = 1
         self._goals = [-1] * count
-        self._layout_ids = [""] * count
+        self._layout_ids = [-1] * count
         self._floors: list[tuple[Flags, Flags] | None] = [None] * count
         self._steps: list[npt.NDArray[np.int32] | None] = [None] * count
 
@@ -74,7 +74,7 @@ class ScriptedPlayer:
         """``(row, col)`` of the goal that the player walks to in a game, None between goals."""
         return None if self._goals[index] < 0 else divmod(self._goals[index], self._width)
 
-    def _has_goal(self, index: int, goal_mask: npt.NDArray[np.bool_], layout_id: str) -> bool:
+    def _has_goal(self, index: int, goal_mask: npt.NDArray[np.bool_], layout_id: int) -> bool:
         """Whether there is a goal to walk to; if the last one is no longer valid, another is drawn."""
         marked = goal_mask.ravel()
         if layout_id == self._layout_ids[index] and self._goals[index] >= 0 and marked[self._goals[index]]:
@@ -99,7 +99,7 @@ class ScriptedPlayer:
         arrays: tuple[Vector, Kitchen, Vector],
         goal_mask: npt.NDArray[np.bool_],
         action_mask: npt.NDArray[np.int8],
-        layout_id: str,
+        layout_id: int,
     ) -> int:
         if not self._has_goal(index, goal_mask, layout_id):
             return STAY

@@ -25,9 +25,11 @@ from legible_envs.overcooked.layouts import (
 )
 from legible_envs.overcooked.recipes import PAPER_SOUPS, check_recipes
 from legible_envs.overcooked.rendering.board import RGB_TILE
-from legible_envs.support.validation import choice, real, switched_weights
+from legible_envs.support.validation import choice, is_integer, is_masked, is_real, real, shown, switched_weights
 
-__all__ = ["OBS_TYPES", "SHAPING", "KitchenSettings", "PackedKitchen"]
+__all__ = ["NUM_ACTIONS", "OBS_TYPES", "SHAPING", "KitchenSettings", "PackedKitchen", "read_action"]
+
+NUM_ACTIONS: Final = 6
 
 OBS_TYPES: Final = ("grid", "vector", "rgb")
 SHAPING: Final[Mapping[str, float]] = {"ingredient": 3.0, "dish": 3.0, "soup": 5.0}
@@ -155,3 +157,20 @@ class KitchenSettings:
             high[..., GRID_CHANNELS.index("tomatoes") + number] = max(most, 1)
         high[..., GRID_CHANNELS.index("ticks cooked")] = max(min(self.rules.cook_time, 255), 1)
         return spaces.Box(np.zeros_like(high), high, dtype=np.uint8)
+
+
+def read_action(action: Any) -> int:
+    """An action as a plain integer.
+
+    Args:
+        action: An integer 0..5, as a number of Python or numpy or an array of one element.
+
+    Raises:
+        ValueError: Anything else.
+    """
+    number = action
+    if isinstance(number, np.ndarray) and number.size == 1 and not is_masked(number):
+        number = number.item()
+    if (is_integer(number) or (is_real(number) and float(number).is_integer())) and 0 <= number < NUM_ACTIONS:
+        return int(number)
+    raise ValueError(f"expected an action 0..{NUM_ACTIONS - 1}, got {shown(action)}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -14,8 +15,9 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from legible_envs.drawing.rendered import Windowed
+from legible_envs.errors import LayoutError
 from legible_envs.overcooked.batch_game import GameOfBatch
-from legible_envs.overcooked.env import NUM_ACTIONS, OvercookedEnv
+from legible_envs.overcooked.env import OvercookedEnv
 from legible_envs.overcooked.game import batch
 from legible_envs.overcooked.game.batch import Batch, Outcome
 from legible_envs.overcooked.game.rules import count_pots, pack_rules
@@ -23,11 +25,13 @@ from legible_envs.overcooked.game.snapshot import make_view, name_goals, to_text
 from legible_envs.overcooked.game.vectors import CROSSINGS, DELIVERIES, STATE_SIZE, Kitchen, Vector
 from legible_envs.overcooked.game.view import GameView
 from legible_envs.overcooked.layout import OvercookedLayout
+from legible_envs.overcooked.layout_batches import layout_entries
 from legible_envs.overcooked.layouts import read_layout
 from legible_envs.overcooked.rendering.board import draw_small, tile_pictures
-from legible_envs.overcooked.settings import KitchenSettings, PackedKitchen
+from legible_envs.overcooked.settings import NUM_ACTIONS, KitchenSettings, PackedKitchen
+from legible_envs.support.per_env import check_count, read_autoreset_mode, read_reset_mask, read_seeds, read_step_limit
 from legible_envs.support.specs import JsonSpec, check_options
-from legible_envs.support.validation import choice, integer, is_integer
+from legible_envs.support.validation import as_array, integer, shown
 
 __all__ = ["OvercookedVectorEnv"]
 
@@ -44,14 +48,15 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
 
     Made by ``gymnasium.make_vec("LegibleOvercooked-v0", num_envs=N, vectorization_mode="vector_entry_point")``.
     Observations, rewards, terminations, truncations and infos are those of ``SyncVectorEnv`` with the same seeds, in
-    all three autoreset modes, but for one key: infos have ``goal_mask`` without ``goals``, the names, which
-    ``envs.goals(i)`` gives when asked. A layout per game: ``envs.set_attr("layout", [...])``, from each game's next
-    reset on; ``envs.reset(options={"layout": ...})`` puts all games into one kitchen.
+    all three autoreset modes. ``envs.reset(options={"layout": ...})`` takes one kitchen for all games or one for each,
+    see "Vectors" there; ``envs.set_attr("layout", [...])`` does so from each game's next reset on. Names of goals:
+    ``envs.call("goals")``, or ``envs.goals(i)`` of one game.
 
     Args:
         num_envs: Number of games.
         max_episode_steps: Steps after which an episode is truncated; None or -1: never.
-        autoreset_mode: ``gymnasium.vector.AutoresetMode`` or its value.
+        autoreset_mode: ``gymnasium.vector.AutoresetMode`` or its value. Given directly: Gymnasium's ``vector_kwargs``
+            are for ``vectorization_mode="sync"`` and ``"async"`` alone.
         render_mode: None, ``"human"`` (all games in one window), ``"rgb_array"`` or ``"ansi"`` (one picture or drawing
             per game).
         **kwargs: As for :class:`~legible_envs.overcooked.env.OvercookedEnv`.
@@ -73,17 +78,12 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
         **kwargs: Any,
     ) -> None:
         super().__init__()
-        asked = getattr(autoreset_mode, "value", autoreset_mode)
-        self.autoreset_mode = AutoresetMode(choice("autoreset_mode", asked, [mode.value for mode in AutoresetMode]))
+        self.autoreset_mode = read_autoreset_mode(autoreset_mode)
         self.metadata = {**OvercookedEnv.metadata, "autoreset_mode": self.autoreset_mode}
         self._set_render_mode(render_mode)
         self.num_envs = integer("num_envs", num_envs, 1, whole_floats=True)
-        if max_episode_steps is not None and not (is_integer(max_episode_steps) and max_episode_steps == -1):
-            max_episode_steps = integer(
-                "max_episode_steps", max_episode_steps, 1, whole_floats=True, also="None or -1 for no limit,"
-            )
         self.settings = KitchenSettings(**kwargs)
-        self.max_episode_steps = None if max_episode_steps in (None, -1) else max_episode_steps
+        self.max_episode_steps = read_step_limit(max_episode_steps)
         self.single_action_space = spaces.Discrete(NUM_ACTIONS)
         self.single_observation_space = self.settings.observation_space()
         self.action_space = batch_space(self.single_action_space, self.num_envs)
@@ -101,7 +101,7 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
         self._num_pots = count_pots(packed.layout)
         self._packed = [packed] * count
         self._chosen: list[PackedKitchen | None] = [None] * count
-        self._ids = np.full(count, packed.layout.layout_id, dtype=object)
+        self._ids = np.full(count, int(packed.layout.layout_id, 16), dtype=np.int64)
         self._routes = np.repeat(packed.routes[None], count, axis=0)
         self._games = Batch(
             states=np.zeros((count, int(packed.rules[STATE_SIZE])), dtype=np.int32),
@@ -125,22 +125,22 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
 
         Args:
             seed: None, a number (game ``i`` gets ``seed + i``), or one per game.
-            options: ``{"layout": …}`` for all games, and ``{"reset_mask": (N,) bool}`` to reset only some.
+            options: ``{"layout": …}``, one for all games (None: their own) or a list or array with one for each (None:
+                the one it has); ``{"reset_mask": (N,) bool}`` to reset only some, and give only these their kitchens.
 
         Returns:
             ``(observations, infos)``.
 
         Raises:
-            LayoutError: A bad kitchen; nothing is changed.
-            ValueError: Unknown option keys, or seeds or a mask of the wrong length.
+            LayoutError: A bad kitchen, or another number of kitchens than of games; nothing is changed.
+            ValueError: Options that are no mapping, unknown keys, or seeds or a mask that are not as above; likewise.
         """
         asked = check_options(options, known=("layout", "reset_mask"))
-        seeds = self._read_seeds(seed)
-        which = self._read_mask(asked)
+        seeds = read_seeds(seed, self.num_envs)
+        which = read_reset_mask(asked, self.num_envs)
         if "layout" in asked:
-            chosen = None if asked["layout"] is None else self._read(asked["layout"], {})
-            for i in np.flatnonzero(which):
-                self._chosen[i] = chosen
+            chosen = self._read_layouts(asked["layout"])
+            self._chosen = [new if there else old for new, old, there in zip(chosen, self._chosen, which, strict=True)]
         for i in np.flatnonzero(which):
             if seeds[i] is not None:
                 self._rngs[i], self._seeds[i] = seeding.np_random(seeds[i])
@@ -200,6 +200,25 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
             self._show(tile_pictures(views))
         return None
 
+    def action_masks(self, index: int | None = None) -> npt.NDArray[np.bool_]:
+        """Actions that do something now, staying always; see :meth:`.OvercookedEnv.action_masks`.
+
+        Args:
+            index: Number of a game.
+
+        Returns:
+            ``(6,)`` for one game, ``(N, 6)`` for all.
+
+        Raises:
+            ResetNeeded: Before the first reset.
+        """
+        if not self._begun:
+            raise ResetNeeded("Cannot call envs.action_masks() before calling envs.reset()")
+        games, which = self._games, slice(None) if index is None else slice(index, index + 1)
+        masks = np.empty((len(games.states[which]), NUM_ACTIONS), dtype=np.int8)
+        batch.find_all_actions(games.states[which], games.kitchens[which], games.rules, masks)
+        return (masks if index is None else masks[0]).astype(np.bool_)
+
     def close_extras(self, **kwargs: Any) -> None:
         """Close the window, if there is one."""
         self._close_window()
@@ -229,10 +248,7 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
         return self._games.states[index], self._games.kitchens[index], self._games.rules
 
     def goals(self, index: int) -> tuple[str, ...]:
-        """Names of the valid goals of one game, in reading order; ``call("goals")`` names those of all games.
-
-        Infos have the mask alone, because naming all games' goals at each step would take longer than the step.
-        """
+        """Names of the valid goals of one game, in reading order; ``call("goals")`` names those of all games."""
         return name_goals(self._packed[index].layout, self._games.goals[index])
 
     def generator(self, index: int) -> tuple[np.random.Generator, int]:
@@ -247,8 +263,9 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
         """Call a method of every game, or get its attribute; as if each were an ``OvercookedEnv``.
 
         Args:
-            name: ``layout``, ``view``, ``arrays``, ``goals``, ``render``, ``np_random``, ``np_random_seed``, or any
-                attribute that all games share, such as ``settings`` or ``render_mode``.
+            name: ``layout``, ``view``, ``arrays``, ``goals``, ``goal_names``, ``action_masks``, ``render``,
+                ``np_random``, ``np_random_seed``, or any attribute that all games share, such as ``settings`` or
+                ``render_mode``.
             *args: Arguments of the method.
             **kwargs: Arguments of the method.
 
@@ -267,21 +284,30 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
 
         Args:
             name: ``"layout"``; nothing else can be set.
-            values: A list or tuple of one kitchen per game, or one for all; None returns to the games' own.
+            values: One kitchen for all, or a list, tuple or array of one per game; None returns a game to its own.
 
         Raises:
             AttributeError: Another name.
-            ValueError: A list of another length.
+            ValueError: Another number of kitchens.
             LayoutError: A bad kitchen; nothing is changed.
         """
         if name != "layout":
             raise AttributeError(f"only the attribute 'layout' can be set in the games of {self}, not {name!r}")
-        if not isinstance(values, list | tuple):
-            values = [values] * self.num_envs
-        if len(values) != self.num_envs:
-            raise ValueError(f"expected {self.num_envs} layouts, one per game, got {len(values)}")
+        # As in Gymnasium's vectors, a list or tuple always holds one value per game.
+        layouts = list(values) if isinstance(values, list | tuple) else layout_entries(values, self.settings.shape)
+        if layouts is None:
+            layouts = [values] * self.num_envs
+        check_count("layout", layouts, self.num_envs)
         known: dict[int, PackedKitchen] = {}
-        self._chosen = [None if value is None else self._read(value, known) for value in values]
+        self._chosen = [None if layout is None else self._read(layout, known) for layout in layouts]
+
+    def set_layout(self, index: int, layout: Any) -> None:
+        """Set the kitchen of one game's next resets; None returns to its own.
+
+        Raises:
+            LayoutError: A bad kitchen; nothing is changed.
+        """
+        self._chosen[index] = None if layout is None else self._read(layout, {})
 
     @property  # type: ignore[misc]
     def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
@@ -295,37 +321,32 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
 
     # -- inside -------------------------------------------------------------------------------------------------------
 
+    def _read_layouts(self, value: Any) -> list[PackedKitchen | None]:
+        """The kitchen chosen for each game, None where it plays in its own, from what the options of a reset say."""
+        layouts = layout_entries(value, self.settings.shape)
+        if layouts is None:
+            return [None if value is None else self._read(value, {})] * self.num_envs
+        check_count("layout", layouts, self.num_envs, partial(LayoutError, rule="count"))
+        known: dict[int, PackedKitchen] = {}
+        return [
+            before if layout is None else self._read(layout, known)
+            for layout, before in zip(layouts, self._chosen, strict=True)
+        ]
+
     def _read(self, value: Any, known: dict[int, PackedKitchen]) -> PackedKitchen:
         """Read and check a kitchen; one object given for many games is read once."""
         if id(value) not in known:
             known[id(value)] = self.settings.pack(read_layout(value, self.settings.shape))
         return known[id(value)]
 
-    def _read_seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
-        if seed is None:
-            return [None] * self.num_envs
-        if isinstance(seed, int | np.integer):
-            return [int(seed) + i for i in range(self.num_envs)]
-        if len(seed) != self.num_envs:
-            raise ValueError(f"expected a seed for each of {self.num_envs} games, got {len(seed)}")
-        return list(seed)
-
-    def _read_mask(self, asked: Any) -> npt.NDArray[np.bool_]:
-        if "reset_mask" not in asked:
-            return np.ones(self.num_envs, dtype=np.bool_)
-        mask = asked["reset_mask"]
-        if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
-            raise ValueError(f"`reset_mask` must be a bool array of shape ({self.num_envs},), got {mask!r}")
-        if not mask.any():
-            raise ValueError("`reset_mask` must mark at least one game")
-        return mask.copy()
-
     def _read_actions(self, actions: Any) -> npt.NDArray[np.int64]:
-        moves = np.asarray(actions)
+        moves = actions if type(actions) is np.ndarray else as_array(actions)
         if moves.shape != (self.num_envs,) or moves.dtype.kind not in "iu":
-            raise ValueError(f"expected {self.num_envs} integer actions, got shape {moves.shape} of {moves.dtype}")
+            raise ValueError(
+                f"expected {self.num_envs} integer actions, got shape {moves.shape} of {moves.dtype}: {shown(actions)}"
+            )
         if not batch.all_within(moves, NUM_ACTIONS):
-            raise ValueError(f"expected actions 0..{NUM_ACTIONS - 1}, got {moves}")
+            raise ValueError(f"expected actions 0..{NUM_ACTIONS - 1}, got {shown(moves)}")
         return moves.astype(np.int64).reshape(-1, 1)
 
     def _check_begun(self) -> None:
@@ -353,7 +374,7 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
             return
         self._make_room(count_pots(packed.layout))
         self._packed[index] = packed
-        self._ids[index] = packed.layout.layout_id
+        self._ids[index] = int(packed.layout.layout_id, 16)
         self._games.kitchens[index] = packed.kitchen
         self._routes[index] = packed.routes
 
@@ -393,7 +414,7 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
         return np.stack([draw_small(self.view(i)) for i in range(self.num_envs)])
 
     def _infos(self, masks: npt.NDArray[np.int8], which: npt.NDArray[np.bool_] | None = None) -> Infos:
-        """The games' infos as ``SyncVectorEnv`` gathers them but for names; zeros (None) in games that have none."""
+        """The games' infos as ``SyncVectorEnv`` gathers them; zeros in games that have none."""
         states = self._games.states
         done = states[:, DELIVERIES].astype(np.int64)
         infos: Infos = {
@@ -405,8 +426,8 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
             "crossings": states[:, CROSSINGS].astype(np.int64),
         }
         if which is not None and not which.all():
-            for key, values in infos.items():
-                values[~which] = None if key == "layout_id" else 0
+            for values in infos.values():
+                values[~which] = 0
         told = self._everyone if which is None else which
         marks = np.empty((len(_MARKS), len(told)), dtype=np.bool_)
         marks[:] = told

@@ -11,17 +11,21 @@ from typing import Any
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
 
+from legible_envs.support.validation import shown
+
 __all__ = ["JsonSpec", "check_options", "plain"]
 
 
-def check_options(options: Mapping[str, Any] | None, known: Sequence[str] = ("layout",)) -> Mapping[str, Any]:
+def check_options(options: object, known: Sequence[str] = ("layout",)) -> Mapping[str, Any]:
     """The options of a reset.
 
     Raises:
-        ValueError: Unknown keys.
+        ValueError: Not a mapping, or unknown keys.
     """
-    if not options:
+    if options is None:
         return {}
+    if not isinstance(options, Mapping):
+        raise ValueError(f"`options` must be None or a mapping with keys among {list(known)}, got {shown(options)}")
     unknown = sorted(str(key) for key in options if key not in known)
     if unknown:
         raise ValueError(f"unknown reset options {unknown}; known: {list(known)}")

@@ -8,18 +8,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from typing import Any, Literal, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 __all__ = [
     "LARGEST",
+    "as_array",
     "choice",
     "entries",
     "flag",
     "integer",
     "integers",
     "is_integer",
+    "is_masked",
     "is_real",
     "real",
     "shown",
@@ -54,6 +58,31 @@ def is_real(value: object) -> bool:
 def is_integer(value: object) -> bool:
     """Whether a value is an int or a numpy integer; no bool, and no float even if it is whole."""
     return isinstance(value, int | np.integer) and not isinstance(value, bool)
+
+
+def is_masked(value: object) -> bool:
+    """Whether numbers are masked, that is marked as missing, in a numpy array or in a list of such.
+
+    Example:
+        >>> is_masked(np.ma.array([1, 2], mask=[True, False])), is_masked([0, np.ma.masked]), is_masked(np.zeros(2))
+        (True, True, False)
+    """
+    if isinstance(value, list | tuple):
+        return any(isinstance(entry, np.ma.MaskedArray) and is_masked(entry) for entry in value)
+    return isinstance(value, np.ma.MaskedArray) and bool(np.ma.is_masked(value))
+
+
+def as_array(value: object) -> npt.NDArray[Any]:
+    """A value as an array; an empty one of objects for masked numbers and what numpy makes no array of.
+
+    Example:
+        >>> as_array([1, 2]).tolist(), as_array([[1], [2, 3]]).shape
+        ([1, 2], (0,))
+    """
+    if not is_masked(value):
+        with suppress(TypeError, ValueError, OverflowError):
+            return np.asarray(value)
+    return np.empty(0, dtype=object)
 
 
 def real(

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 from gymnasium import spaces
+from gymnasium.error import ResetNeeded
 
 from legible_envs.drawing.rendered import Rendered
 from legible_envs.errors import LayoutError
 from legible_envs.rollouts.trajectory import Trajectory
+from legible_envs.support.per_env import own_entry
 from legible_envs.support.specs import JsonSpec, check_options
+from legible_envs.support.validation import shown
 from legible_envs.tabletop.game.game import DT, RATE, TableGame
 from legible_envs.tabletop.game.shaping import Shaping
 from legible_envs.tabletop.game.view import TableView
@@ -21,7 +25,14 @@ from legible_envs.tabletop.layout import TabletopLayout
 from legible_envs.tabletop.observations import ObservationBuilder
 from legible_envs.tabletop.partner.intent import IntentObserver
 from legible_envs.tabletop.partner.team import Team, make_partner
-from legible_envs.tabletop.settings import TableSettings, keys_to_action, read_start
+from legible_envs.tabletop.settings import (
+    ELSEWHERE,
+    TableSettings,
+    keys_to_action,
+    layout_entries,
+    read_action,
+    read_start,
+)
 from legible_envs.tabletop.task import TabletopTask
 
 __all__ = ["TabletopEnv"]
@@ -125,24 +136,38 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
 
     ## Information
 
-    Every `reset` and `step` returns fresh
+    Every `reset` and `step` returns fresh numbers and arrays of fixed shape, so that wrappers can stack, convert and
+    record them:
 
     | Key             | Content |
     | --------------- | ------- |
-    | `goals`         | tuple of str: names of the objects that may validly be reached for now, as `env.unwrapped.goals` gives them; empty while the hand carries an object to its place |
-    | `goal_mask`     | `(n,)` bool: the same for the `n` objects in the order of the layout |
-    | `candidate_set` | `"game"`: these goals are valid in the running game |
-    | `start`         | name of where the present reach began in the task: a start of the table, an object, or `elsewhere` |
-    | `stage`         | index in `task.graph.stages()` of the pair of `start` and `goals`; -1 if none |
-    | `holding`       | name of the object in the hand, or None |
+    | `goal_mask`     | `(n,)` bool: the objects that may validly be reached for now in the running game (candidate set `game`), in the order of the layout; none while the hand carries an object to its place |
+    | `start`         | int: where the present reach began in the task, an index into `env.unwrapped.start_names` |
+    | `stage`         | int: index in `task.graph.stages()` of the pair of this start and these goals; -1 if none |
+    | `holding`       | int: index of the object in the hand, -1 for none |
     | `num_done`      | int: subtasks finished, such as objects placed |
-    | `crossings`     | number of crossings of soft obstacles |
-    | `path_length`   | metres the hand has moved |
-    | `time`          | seconds since the episode began |
-    | `layout_id`     | twelve hexadecimal digits that identify the layout |
-    | `belief`        | with a predictor or partner: `{goal: probability}` of the present reach, empty where there is none |
-    | `robot_state`, `robot_target` | with a partner: its state, and the object it goes for or carries |
-    | `completion_time`, `human_idle`, `robot_idle`, `concurrent_activity`, `functional_delay`, `conflicts`, `goals_lost`, `decision_time`, `decision_fraction`, `decided`, `decided_rightly` | with a partner: measures of the team so far, see `legible_envs.tabletop.partner.fluency`; None where not known yet |
+    | `crossings`     | int: crossings of soft obstacles |
+    | `path_length`   | float: metres the hand has moved |
+    | `time`          | float: seconds since the episode began |
+    | `layout_id`     | int: identifies the layout; the number that the twelve hexadecimal digits of `layout.layout_id` write, `int(layout.layout_id, 16)` |
+    | `belief`        | with a predictor or partner: `(n,)` float, the probability of each object to be the goal of the present reach; zeros where there is no belief |
+    | `robot_target`  | with a partner: int, index of the object it goes for or carries, -1 for none |
+    | `completion_time`, `human_idle`, `robot_idle`, `concurrent_activity`, `functional_delay`, `conflicts`, `goals_lost`, `decision_time`, `decision_fraction`, `decided`, `decided_rightly` | with a partner: floats, measures of the team so far, see `legible_envs.tabletop.partner.fluency`; `inf` where not known yet |
+
+    Names are told when asked for: `env.unwrapped.goals` names the valid goals, `goal_names` all objects, so that
+    `env.unwrapped.goal_names[info["goal_mask"]]` names the valid ones from the mask; `start`, `holding`,
+    `robot_target`, `robot_state` and `belief` are those of this moment in words.
+
+    Actions are continuous and all of them are allowed at any time, so there are no action masks.
+
+    ## Vectors
+
+    `gymnasium.make_vec` makes `TabletopVectorEnv`, environments one after another in one process, or Gymnasium's own
+    vectors with `vectorization_mode="sync"` or `"async"`. In all three, `reset(options={"layout": ...})` takes one
+    layout for all environments, or a list, tuple or array with one for each: in any form that `layout` takes, or None,
+    which keeps the one there is. So `ws.sample(num_envs, rng)`, an array `(n, d)` of genomes, gives each environment
+    its own. The autoreset mode is given as `make_vec(id, num_envs, autoreset_mode="SameStep")`, and as
+    `vector_kwargs={"autoreset_mode": "SameStep"}` with `"sync"` and `"async"`.
 
     ## Arguments
 
@@ -176,8 +201,9 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
     Raises:
         LayoutError: A layout that cannot be read, breaks a rule (`rule` names it), or is of another task.
         TaskError: Not a task.
-        ValueError: Any other bad argument; unknown keys in the options of `reset`; at `reset`, a predictor given by
-            name that cannot be fitted at this table.
+        ValueError: Any other bad argument, options of `reset` or actions; at `reset`, a predictor given by name that
+            cannot be fitted at this table.
+        ResetNeeded: `step` before the first `reset`.
         TypeError: A partner or predictor that lacks the methods.
 
     ## Version History
@@ -236,6 +262,10 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
         self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
         self.observation_space = self._observations.space
         self._chosen: TabletopLayout | None = None
+        self._begun = False
+        self._layout_number = 0
+        names = dict.fromkeys([*layout.table.starts, *layout.goals, ELSEWHERE])
+        self._starts = {name: i for i, name in enumerate(names)}
 
     def _make_team(self, partner: object, predictor: object) -> Team:
         if partner is None:
@@ -256,7 +286,8 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
         Args:
             seed: Seed of the environment's generator; None goes on with the one there is. Without a partner that uses
                 it, nothing here is random.
-            options: ``"layout"``: play on another layout from now on; None returns to the environment's own.
+            options: ``"layout"``: play on another layout from now on; None returns to the environment's own. In a
+                vector, a list or array of layouts holds one per environment.
                 ``"start"``: where the hand starts this time, the name of a start or object of the table or ``(x, y)``.
                 ``"goal"``: the goal of the first reach, an object that is valid at first; until it has been taken, the
                 hand takes no other.
@@ -266,25 +297,27 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
 
         Raises:
             LayoutError: A bad layout, start or goal; the episode goes on as if `reset` had not been called.
-            ValueError: Unknown option keys; or a predictor given by name that cannot be fitted at this table.
+            ValueError: Options that are no mapping, or unknown keys, likewise; or a predictor given by name that cannot
+                be fitted at this table.
+            gymnasium.error.Error: A seed that is no whole number >= 0; likewise.
         """
-        super().reset(seed=seed)
         asked = check_options(options, ("layout", "start", "goal"))
-        chosen = self._chosen
-        if "layout" in asked:
-            chosen = None if asked["layout"] is None else self._read(asked["layout"])
+        chosen = self._read(asked["layout"]) if "layout" in asked else self._chosen
         layout = chosen or self.settings.layout
         start = asked.get("start")
         begin = read_start(self.task.graph.start if start is None else start, layout)
         goal = asked.get("goal")
         if goal is not None:
             self._check_goal(goal, self._game.progress.first_goals)
+        super().reset(seed=seed)
         self._chosen = chosen
         self._game.begin(layout, begin.at, begin.name, goal)
         if self._shaping is not None:
             self._shaping.begin()
         self._observations.enter(layout)
+        self._layout_number = int(layout.layout_id, 16)
         self._team.begin(self._game, self.np_random)
+        self._begun = True
         if self.render_mode == "human":
             self.render()
         return self._look()
@@ -299,9 +332,12 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
             ``(observation, reward, terminated, truncated, info)``.
 
         Raises:
+            ResetNeeded: Before the first reset.
             ValueError: Not two finite numbers.
         """
-        x, y = self._read_action(action)
+        if not self._begun:
+            raise ResetNeeded("Cannot call env.step() before calling env.reset()")
+        x, y = read_action(action)
         game, settings = self._game, self.settings
         crossings, held = game.crossings, game.holding
         top = settings.rules.max_speed
@@ -328,9 +364,17 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
 
     @layout.setter
     def layout(self, value: object) -> None:
-        self._chosen = None if value is None else self._read(value)
+        self._chosen = self._read(value)
 
-    def _read(self, value: object) -> TabletopLayout:
+    def _read(self, value: object) -> TabletopLayout | None:
+        """The layout that is asked for; None for the environment's own."""
+        entries = layout_entries(value)
+        if entries is not None:
+            value = own_entry("layout", entries, self, partial(LayoutError, rule="count"))
+            if value is None:
+                return self._chosen
+        if value is None:
+            return None
         for known in (self._chosen, self._game.layout, self.settings.layout):
             if known is not None and value is known:
                 return known
@@ -360,8 +404,38 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
 
     @property
     def goals(self) -> tuple[str, ...]:
-        """Names of the objects that the person may validly reach for now, as in ``info["goals"]``."""
+        """Names of the objects that the person may validly reach for now, sorted: those in ``info["goal_mask"]``."""
         return self._game.goals
+
+    @property
+    def goal_names(self) -> npt.NDArray[np.str_]:
+        """``(n,)`` names of the objects, so that ``goal_names[info["goal_mask"]]`` names the valid goals."""
+        return np.array(self._game.names)
+
+    @property
+    def start_names(self) -> npt.NDArray[np.str_]:
+        """Names of where a reach can begin: the starts of the table, the objects, and ``elsewhere``."""
+        return np.array(list(self._starts))
+
+    @property
+    def start(self) -> str:
+        """Name of where the present reach began in the task."""
+        return self._game.progress.place
+
+    @property
+    def belief(self) -> dict[str, float] | None:
+        """``{goal: probability}`` of the present reach, as the predictor or partner has it; None where it has none."""
+        return None if self._team.belief is None else dict(self._team.belief)
+
+    @property
+    def robot_state(self) -> str | None:
+        """What the partner is doing, in its own word, such as ``"wait"``; None without one."""
+        return None if self._team.command is None else self._team.command.state
+
+    @property
+    def robot_target(self) -> str | None:
+        """Name of the object that the partner goes for or carries."""
+        return None if self._team.command is None else self._team.command.target
 
     @property
     def goal(self) -> str | None:
@@ -463,18 +537,16 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
     def _info(self, goals: tuple[str, ...]) -> dict[str, Any]:
         game = self._game
         return {
-            "goals": goals,
             "goal_mask": self._mask(goals),
-            "candidate_set": "game",
-            "start": game.progress.place,
+            "start": self._starts[game.progress.place],
             "stage": game.progress.stage(goals),
-            "holding": self._name(game.holding),
+            "holding": game.holding,
             "num_done": game.progress.num_done,
             "crossings": game.crossings,
             "path_length": game.path_length,
             "time": game.time,
-            "layout_id": game.layout.layout_id,
-            **self._team.info(),
+            "layout_id": self._layout_number,
+            **self._team.info(game.index),
         }
 
     def _mask(self, goals: tuple[str, ...]) -> npt.NDArray[np.bool_]:
@@ -487,17 +559,7 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
         return self._game.names[i] if i >= 0 else None
 
     def _check_goal(self, goal: object, valid: tuple[str, ...]) -> None:
-        if goal not in valid:
+        if not isinstance(goal, str) or goal not in valid:
             raise LayoutError(
-                f"the goal must be an object that is valid now, one of {list(valid)}; got {goal!r}", rule="goal"
+                f"the `goal` must be an object that is valid now, one of {list(valid)}; got {shown(goal)}", rule="goal"
             )
-
-    @staticmethod
-    def _read_action(action: npt.ArrayLike) -> tuple[float, float]:
-        try:
-            x, y = map(float, action)  # type: ignore[arg-type]
-            if not (abs(x) < np.inf and abs(y) < np.inf):
-                raise ValueError
-        except (TypeError, ValueError):
-            raise ValueError(f"expected an action of two finite numbers, got {action!r}") from None
-        return x, y

@@ -98,7 +98,7 @@ class ReachingPlayer:
         if time == 0 or time < self._time:
             self._begin()
         self._time = time
-        self._decide(info)
+        self._decide()
         if self._errand is None or self._pause > 0:
             self._pause = max(self._pause - 1, 0)
             return np.zeros(2, dtype=np.float32)
@@ -124,13 +124,13 @@ class ReachingPlayer:
         self._path, self._next = np.empty((0, 2)), 0
         self._attempts = 0
 
-    def _decide(self, info: Mapping[str, Any]) -> None:
+    def _decide(self) -> None:
         """Notice an object that was taken or put down, and a goal that is no longer valid."""
-        held: str | None = info["holding"]
+        held: str | None = self._table.holding
         if held is not None and self._table.carry_to is not None:
             errand: _Errand | None = _Errand("carry", held)
         else:
-            errand = self._choose_goal(info["goals"])
+            errand = self._choose_goal(self._table.goals)
         if errand != self._errand or held != self._held:
             if held != self._held:
                 self._pause = round(self.person.pause * self._rate)

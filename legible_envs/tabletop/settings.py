@@ -5,21 +5,32 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from itertools import product
+from numbers import Number
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from legible_envs.errors import LayoutError
-from legible_envs.support.validation import choice, integer, real, shown, switched_weights
+from legible_envs.support.validation import choice, integer, is_masked, real, shown, switched_weights
 from legible_envs.tabletop.game.game import CONTACTS, GameRules
 from legible_envs.tabletop.game.shaping import SHAPING
 from legible_envs.tabletop.layout import TabletopLayout
 from legible_envs.tabletop.objects import Point, point
 from legible_envs.tabletop.task import TabletopTask, read_task
 
-__all__ = ["HAND_SPEED", "Start", "TableSettings", "keys_to_action", "read_layout", "read_start"]
+__all__ = [
+    "ELSEWHERE",
+    "HAND_SPEED",
+    "Start",
+    "TableSettings",
+    "keys_to_action",
+    "layout_entries",
+    "read_action",
+    "read_layout",
+    "read_start",
+]
 
 HAND_SPEED: Final = 0.5
 """How fast a key moves the hand, m/s: too fast to take an object, so that players take by letting go."""
@@ -64,6 +75,46 @@ def read_layout(value: object, task: TabletopTask, max_obstacles: int) -> Tablet
     _check_of_task(layout, task, max_obstacles)
     layout.validate()
     return layout
+
+
+def layout_entries(value: object) -> list[Any] | None:
+    """The layouts of a list or array with one for each environment; None where the value describes one layout.
+
+    A genome is a flat list or array of numbers. So an array ``(n, d)``, and a list (tuple, array of objects) whose
+    entries are no numbers, hold a layout for each environment.
+
+    Args:
+        value: What a user gave; the entries are not read.
+    """
+    if isinstance(value, np.ndarray):
+        return list(value) if value.ndim == 2 or (value.ndim == 1 and value.dtype.kind in "OUT") else None
+    if not isinstance(value, list | tuple) or not value or any(isinstance(entry, Number) for entry in value):
+        return None
+    return list(value)
+
+
+def read_action(action: npt.ArrayLike) -> tuple[float, float]:
+    """An action as two numbers.
+
+    Args:
+        action: ``(2,)`` finite numbers.
+
+    Raises:
+        ValueError: Anything else.
+    """
+    try:
+        if type(action) is not np.ndarray:
+            if isinstance(action, str | bytes | Mapping) or is_masked(action):
+                raise ValueError
+            action = np.asarray(action)
+        if action.shape != (2,) or action.dtype.kind not in "biuf":
+            raise ValueError
+        x, y = action.tolist()
+        if not (abs(x) < math.inf and abs(y) < math.inf):
+            raise ValueError
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError(f"expected an action of two finite numbers, got {shown(action)}") from None
+    return x, y
 
 
 def _numbers(value: object) -> npt.NDArray[np.float64]:

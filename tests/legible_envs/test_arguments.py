@@ -6,6 +6,7 @@ import math
 import gymnasium as gym
 import numpy as np
 import pytest
+from gymnasium.utils.env_checker import data_equivalence
 
 from legible_envs.errors import LayoutError, TaskError
 from legible_envs.overcooked import OvercookedWorkspace
@@ -13,6 +14,7 @@ from legible_envs.overcooked.env import OvercookedEnv
 from legible_envs.overcooked.vector_env import OvercookedVectorEnv
 from legible_envs.tabletop import TabletopWorkspace
 from legible_envs.tabletop.env import TabletopEnv
+from legible_envs.tabletop.vector_env import TabletopVectorEnv
 
 BAD = {
     "text": "a",
@@ -47,6 +49,7 @@ ALLOWED = {
     (OvercookedWorkspace, "distinct_access"): {"bool"},
     (OvercookedWorkspace, "start_from"): {"none"},
     (OvercookedWorkspace, "cell_costs"): {"none"},
+    (TabletopVectorEnv, "max_episode_steps"): {"none"},
     (TabletopEnv, "layout"): {"none"},
     (TabletopEnv, "partner"): {"none"},
     (TabletopEnv, "predictor"): {"none"},
@@ -75,9 +78,18 @@ CONTENTS = {
 TYPES = {(TabletopEnv, "partner"), (TabletopEnv, "predictor")}
 """Objects without the methods are a TypeError, as documented."""
 
+CONSTRUCTORS = (
+    OvercookedEnv,
+    OvercookedVectorEnv,
+    OvercookedWorkspace,
+    TabletopEnv,
+    TabletopVectorEnv,
+    TabletopWorkspace,
+)
+
 ARGUMENTS = [
     pytest.param(made, name, id=f"{made.__name__}-{name}")
-    for made in (OvercookedEnv, OvercookedVectorEnv, OvercookedWorkspace, TabletopEnv, TabletopWorkspace)
+    for made in CONSTRUCTORS
     for name, parameter in inspect.signature(made).parameters.items()
     if parameter.kind is not inspect.Parameter.VAR_KEYWORD
 ]
@@ -169,3 +181,165 @@ def test_numbers_of_numpy_mean_the_same():
     assert repr(table.to_config()) == repr(TabletopWorkspace(max_obstacles=2, beta=10, step_sd=0.5).to_config())
     workspace = OvercookedWorkspace(np.array([6, 7]), pots=np.int8(1), c=np.int32(2), relocation_cost=np.float64(1))
     assert repr(workspace.to_config()) == repr(OvercookedWorkspace((6, 7), pots=1, c=2, relocation_cost=1).to_config())
+
+
+# -- step and reset of every environment, single and batched -----------------------------------------------------------
+
+MASKED = np.ma.array([1, 2, 3], mask=[True, False, False])
+
+
+class Unreadable:
+    """What numpy cannot make an array of."""
+
+    def __array__(self, dtype=None, copy=None):
+        raise TypeError("no array")
+
+    def __repr__(self):
+        raise RuntimeError("no text")
+
+
+STRANGE = {
+    **BAD,
+    "empty text": "",
+    "bytes": b"ab",
+    "complex": 1 + 2j,
+    "negative": -1,
+    "too large": 6,
+    "fraction": 0.5,
+    "masked": MASKED,
+    "masked scalar": np.ma.masked,
+    "masked numbers": np.ma.array([0.1, 0.2], mask=[True, False]),
+    "ragged": [[1], [2, 3]],
+    "nested": [[1, 2], [3, 4]],
+    "huge numbers": [10**400, 0.0],
+    "nans": [math.nan, 0.0],
+    "texts": ["1", "2"],
+    "digits": "12",
+    "objects": np.array([None, object()]),
+    "dates": np.array(["2024-01-01", "2024-01-02"], dtype="datetime64[D]"),
+    "set": {1, 2},
+    "generator": (each for each in ()),
+    "class": int,
+    "function": len,
+    "layout of nothing": np.zeros((0, 0)),
+    "structured": np.zeros(2, dtype=[("a", float), ("b", float)]),
+    "unreadable": Unreadable(),
+}
+"""Values of every kind that somebody may hand over by mistake."""
+
+KITCHEN, TABLE = "LegibleOvercooked-v0", "LegibleTabletop-v0"
+
+
+def single(name):
+    return gym.make(name, disable_env_checker=True).unwrapped
+
+
+MADE = {
+    "kitchen": lambda: single(KITCHEN),
+    "table": lambda: single(TABLE),
+    "kitchens": lambda: gym.make_vec(KITCHEN, num_envs=3),
+    "tables": lambda: gym.make_vec(TABLE, num_envs=3),
+}
+STILL = {"kitchen": 4, "table": np.zeros(2), "kitchens": np.full(3, 4), "tables": np.zeros((3, 2))}
+
+
+@pytest.fixture(params=MADE)
+def played(request):
+    """An environment in mid-episode, a twin of it, and an action that does nothing."""
+    envs = [MADE[request.param]() for _ in range(2)]
+    for each in envs:
+        each.reset(seed=0)
+        each.step(STILL[request.param])
+    return *envs, STILL[request.param]
+
+
+def assert_same_game(env, twin, still):
+    """What was refused has changed nothing: the episode, and all later ones, go on alike."""
+    for results in ((env.step(still), twin.step(still)), (env.reset(), twin.reset())):
+        assert data_equivalence(*results, exact=True)
+    assert data_equivalence(env.step(still), twin.step(still), exact=True)
+    rngs = [each.np_random if isinstance(each.np_random, tuple) else (each.np_random,) for each in (env, twin)]
+    assert [rng.random() for rng in rngs[0]] == [rng.random() for rng in rngs[1]]
+
+
+@pytest.mark.filterwarnings("error")
+def test_strange_actions_are_refused_by_name(played):
+    env, twin, still = played
+    for kind, value in STRANGE.items():
+        for action in (value, [value] * 3):
+            with pytest.raises(ValueError, match="action") as refusal:
+                env.step(action)
+            assert len(str(refusal.value)) < 400, kind
+    assert_same_game(env, twin, still)
+
+
+@pytest.mark.parametrize("key", ["layout", "start", "goal", "reset_mask", "colour", 5, None])
+def test_strange_options_are_refused_by_name(played, key):
+    env, twin, still = played
+    for kind, value in STRANGE.items():
+        if value is None and key in ("layout", "start", "goal"):
+            continue  # the environment's own
+        # What is wrong in a layout of which form is told by the tests of layouts.
+        error, message = (LayoutError, r".") if key == "layout" else (ValueError, rf"{key}|expected")
+        with pytest.raises(error, match=message) as refusal:
+            env.reset(seed=3, options={key: value})
+        assert len(str(refusal.value)) < 500, kind
+    assert_same_game(env, twin, still)
+
+
+def test_options_that_are_no_mapping_are_refused(played):
+    env, twin, still = played
+    for value in STRANGE.values():
+        if value is not None:
+            with pytest.raises(ValueError, match=r"`options` must be None or a mapping|unknown reset options"):
+                env.reset(options=value)
+    assert_same_game(env, twin, still)
+
+
+def test_strange_seeds_are_refused_as_gymnasium_does(played):
+    env, twin, still = played
+    for kind, value in STRANGE.items():
+        if value is None or (isinstance(value, int) and value >= 0):
+            continue  # also True, 6 and 10**400: Gymnasium takes them
+        with pytest.raises((ValueError, gym.error.Error), match=r"[Ss]eed|integer"):
+            env.reset(seed=value)
+        assert kind
+    assert_same_game(env, twin, still)
+
+
+def test_layouts_set_between_episodes_are_checked_too(played):
+    env, twin, still = played
+    is_batch = hasattr(env, "num_envs")
+    for value in STRANGE.values():
+        if value is not None:
+            with pytest.raises((LayoutError, ValueError)):
+                env.set_attr("layout", value) if is_batch else setattr(env, "layout", value)
+    assert_same_game(env, twin, still)
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_nothing_is_done_before_the_first_reset(name):
+    env = MADE[name]()
+    for call in (lambda: env.step(STILL[name]), *([env.action_masks] if hasattr(env, "action_masks") else [])):
+        with pytest.raises(gym.error.ResetNeeded, match=r"before calling envs?\.reset\(\)"):
+            call()
+    env.reset(seed=0)
+    env.step(STILL[name])
+
+
+def test_actions_in_every_honest_form_mean_the_same():
+    kitchen, table = single(KITCHEN), single(TABLE)
+    kitchen.reset(seed=0)
+    table.reset(seed=0)
+    for action in (2, np.int8(2), np.uint64(2), 2.0, np.float32(2), np.array(2), np.array([2]), np.array(2.0)):
+        kitchen.reset()
+        assert np.array_equal(kitchen.step(action)[0], (kitchen.reset(), kitchen.step(2))[1][0])
+    for action in (
+        [0.5, 0],
+        (0.5, 0.0),
+        np.array([0.5, 0]),
+        np.array([0.5, 0], dtype=np.float16),
+        [np.float32(0.5), 0],
+    ):
+        table.reset()
+        assert np.array_equal(table.step(action)[0], (table.reset(), table.step(np.array([0.5, 0.0])))[1][0])

@@ -45,6 +45,11 @@ def same(first: Any, second: Any) -> bool:
     return data_equivalence(first, second, exact=True)
 
 
+def number(layout: Any) -> int:
+    """What infos call a layout."""
+    return int(layout.layout_id, 16)
+
+
 def in_a_new_process(code: str, **environment: str) -> str:
     command = [sys.executable, "-c", code]
     environ = {**os.environ, **environment}
@@ -225,14 +230,14 @@ def test_layouts_are_sticky_until_replaced(plain: Case) -> None:
     env, other, still = plain.make(), plain.kind.other, plain.kind.still
     default = env.get_wrapper_attr("layout")
     assert default != other
-    assert env.reset(options={"layout": other})[1]["layout_id"] == other.layout_id
-    assert env.reset()[1]["layout_id"] == other.layout_id
+    assert env.reset(options={"layout": other})[1]["layout_id"] == number(other)
+    assert env.reset()[1]["layout_id"] == number(other)
     env.set_wrapper_attr("layout", default)
-    assert env.step(still)[4]["layout_id"] == other.layout_id
+    assert env.step(still)[4]["layout_id"] == number(other)
     assert env.get_wrapper_attr("layout") == default
-    assert env.reset()[1]["layout_id"] == default.layout_id
+    assert env.reset()[1]["layout_id"] == number(default)
     env.reset(options={"layout": other})
-    assert env.reset(options={"layout": None})[1]["layout_id"] == default.layout_id
+    assert env.reset(options={"layout": None})[1]["layout_id"] == number(default)
 
 
 def test_unknown_options_are_named_and_change_nothing(case: Case) -> None:
@@ -249,18 +254,19 @@ def test_unknown_options_are_named_and_change_nothing(case: Case) -> None:
 # -- infos -------------------------------------------------------------------------------------------------------------
 
 
-def test_infos_have_one_structure(case: Case) -> None:
+def test_infos_are_numbers_of_one_structure(case: Case) -> None:
+    """So that any wrapper can stack, convert and record them."""
     env = case.make()
     infos = [result[-1] for result in rollout(case, env, 1, 150)]
     for info in infos:
         assert list(info) == list(infos[0])
-        assert "done" not in info
-        assert isinstance(info["goals"], tuple)
         assert type(info["num_done"]) is int
-        assert len(info["layout_id"]) == 12
-        assert int(info["layout_id"], 16) >= 0
+        assert info["layout_id"] == number(env.unwrapped.view().layout)
         for name, value in info.items():
+            assert type(value) is type(infos[0][name])
+            assert isinstance(value, int | float | np.ndarray), name
             if isinstance(value, np.ndarray):
+                assert value.dtype.kind in "bif"
                 assert (value.shape, value.dtype) == (infos[0][name].shape, infos[0][name].dtype)
 
 
@@ -295,7 +301,8 @@ def test_goals_are_named_as_they_are_marked(case: Case) -> None:
     game: Any = env.unwrapped
     observation, info = env.reset(seed=0)
     for _ in range(600):
-        assert info["goals"] == game.goals == case.kind.marked(game.view().layout, info["goal_mask"])
+        assert game.goals == case.kind.marked(game.view().layout, info["goal_mask"])
+        assert sorted(game.goals) == sorted(game.goal_names[info["goal_mask"]].tolist())
         action = (policy if rng.random() < 0.8 else random)(observation, info)
         observation, _, terminated, truncated, info = env.step(action)
         if terminated or truncated:
@@ -309,7 +316,7 @@ def test_policies_finish_an_episode(case: Case, policy: str) -> None:
     player = case.kind.policies[policy](env)
 
     def check(observation: Any, info: dict[str, Any]) -> Any:
-        assert info["goals"] == game.goals == case.kind.marked(game.layout, info["goal_mask"])
+        assert game.goals == case.kind.marked(game.layout, info["goal_mask"])
         action = player(observation, info)
         assert env.action_space.contains(action) or np.issubdtype(type(action), np.integer)
         return action
@@ -321,7 +328,7 @@ def test_policies_finish_an_episode(case: Case, policy: str) -> None:
     assert done[0] == 0
     assert done == sorted(done)
     assert done[-1] == case.kind.subtasks(game)
-    assert results[-1][-1]["goals"] == game.goals == ()
+    assert game.goals == ()
     assert not results[-1][-1]["goal_mask"].any()
 
 
@@ -354,6 +361,64 @@ def test_recorded_actions_play_the_episode_again(case: Case) -> None:
     assert [result[1] for result in again[1:]] == recorded.rewards
 
 
+def test_minari_collects_infos_too(plain: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whole episodes, so that goals come and go; what is read back is what was returned."""
+    minari = pytest.importorskip("minari")
+    pytest.importorskip("jax", reason="Minari's collector needs its extra `create`")
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    arguments = {"partner": "robot"} if plain.env_id == TABLE_ID else {}
+    env = minari.DataCollector(plain.make(**arguments), record_infos=True)
+    results = [episode(env, next(iter(plain.kind.policies.values()))(env), seed) for seed in range(2)]
+    named = env.create_dataset("legible/test-v0", author="a", code_permalink="b", author_email="c", algorithm_name="d")
+    for recorded, played in zip(named.iterate_episodes(), results, strict=True):
+        for name, values in recorded.infos.items():
+            assert np.array_equal(values, [result[-1][name] for result in played])
+        assert set(recorded.infos) == set(played[0][-1])
+    env.close()
+
+
+# -- action masks ------------------------------------------------------------------------------------------------------
+
+
+def test_masks_allow_what_does_something() -> None:
+    """An action that is masked leaves the game as it is; one that is allowed, staying aside, does not."""
+    env = gym.make(KITCHEN_ID, layout=KINDS[KITCHEN_ID].other, virtual_obstacles="soft")
+    game: Any = env.unwrapped
+    policy, random = KINDS[KITCHEN_ID].policies["scripted"](env), np.random.default_rng(0)
+    observation, info = env.reset(seed=0)
+    for _ in range(60):
+        masks = env.get_wrapper_attr("action_masks")()
+        assert (masks.shape, masks.dtype) == ((6,), np.bool_)
+        assert np.array_equal(masks, info["action_mask"])
+        twins: Any = [copy.deepcopy(game) for _ in range(6)]
+        views = [(twin.step(action), twin.view())[1] for action, twin in enumerate(twins)]
+        assert masks.tolist() == [action == 4 or view != views[4] for action, view in enumerate(views)]
+        action = policy(observation, info) if random.random() < 0.8 else int(random.integers(6))
+        observation, _, over, _, info = env.step(action)
+        if over:
+            observation, info = env.reset()
+
+
+@pytest.mark.parametrize("mode", VECTORS)
+def test_masks_of_vectors_are_those_of_their_environments(mode: str) -> None:
+    envs = gym.make_vec(KITCHEN_ID, num_envs=3, vectorization_mode=mode, layouts="random")
+    try:
+        envs.reset(seed=0)
+        rng = np.random.default_rng(0)
+        for _ in range(30):
+            infos = envs.step(rng.integers(6, size=3))[4]
+            masks = envs.call("action_masks")
+            assert np.array_equal(masks, infos["action_mask"])
+            if mode == "vector_entry_point":
+                assert np.array_equal(envs.action_masks(), masks)
+    finally:
+        envs.close()
+
+
+def test_a_table_offers_no_masks() -> None:
+    assert not gym.make(TABLE_ID).has_wrapper_attr("action_masks")
+
+
 # -- vectors -----------------------------------------------------------------------------------------------------------
 
 
@@ -364,14 +429,12 @@ def vector_and_singles(case: Case, mode: str, **more: Any) -> tuple[Any, list[An
 
 
 def assert_infos_agree(infos: dict[str, Any], singles: list[dict[str, Any]]) -> None:
-    """A vector's infos are those of its environments; ``goals`` may be left out."""
-    for name in singles[0].keys() - (set() if "goals" in infos else {"goals"}):
+    """A vector's infos are those of its environments."""
+    assert infos.keys() == {*singles[0], *(f"_{name}" for name in singles[0])}
+    for name in singles[0]:
         for i, info in enumerate(singles):
-            if isinstance(info[name], dict):
-                assert {goal: infos[name][goal][i] for goal in info[name]} == info[name]
-            elif info[name] is not None:
-                assert np.array_equal(infos[name][i], info[name]), name
-                assert infos[f"_{name}"][i]
+            assert np.array_equal(infos[name][i], info[name]), name
+            assert infos[f"_{name}"][i]
 
 
 def agree(case: Case, mode: str, steps: int, **more: Any) -> None:
@@ -386,7 +449,7 @@ def agree(case: Case, mode: str, steps: int, **more: Any) -> None:
         for _ in range(steps):
             assert all(np.array_equal(observations[i], results[i][0]) for i in range(2))
             assert_infos_agree(infos, [result[-1] for result in results])
-            assert envs.call("goals") == tuple(result[-1]["goals"] for result in results)
+            assert envs.call("goals") == tuple(env.unwrapped.goals for env in singles)
             actions = [policies[i](*results[i][:: len(results[i]) - 1]) for i in range(2)]
             results = [
                 (*env.reset(),) if len(result) == 5 and (result[2] or result[3]) else env.step(action)
@@ -426,7 +489,7 @@ def test_every_environment_of_a_vector_has_its_layout(plain: Case, mode: str) ->
         envs.reset(seed=0)
         envs.set_attr("layout", layouts)
         _, infos = envs.reset()
-        assert infos["layout_id"].tolist() == [layout.layout_id for layout in layouts]
+        assert infos["layout_id"].tolist() == [number(layout) for layout in layouts]
         envs.step(np.array([plain.kind.still] * 2))
         assert envs.get_attr("layout") == tuple(layouts)
     finally:

@@ -230,6 +230,15 @@ def vector_observations(
 
 
 @kernel
+def find_all_actions(
+    states: Vectors, kitchens: npt.NDArray[np.int16], rules: Vector, masks: npt.NDArray[np.int8]
+) -> None:
+    """Write the ``(N, 6)`` masks of actions that do something in ``N`` games."""
+    for i in range(states.shape[0]):
+        find_actions(states[i], kitchens[i], rules, 0, masks[i])
+
+
+@kernel
 def all_within(values: npt.NDArray[np.int64], end: int) -> bool:
     """Whether all integers lie in ``0 .. end - 1``."""
     for value in values:

@@ -163,17 +163,26 @@ class Team:
             belief = self.observer.observe(senses) if senses.person_holding is None or senses.goals else None
         self.belief = None if belief is None else {goal: float(p) for goal, p in belief.items()}
 
-    def info(self) -> dict[str, Any]:
-        """The part of ``info`` about belief and robot; None where a measure is not known yet."""
+    def info(self, index: Mapping[str, int]) -> dict[str, Any]:
+        """The part of ``info`` about belief and robot; ``inf`` where a measure is not known yet.
+
+        Not NaN, which is equal to nothing, not even to itself in the same episode played again.
+
+        Args:
+            index: Number of each object.
+        """
         if not self.is_there:
             return {}
-        # A mapping in any case: vector environments cannot stack one with None.
-        info: dict[str, Any] = {"belief": dict(self.belief or {})}
+        belief = np.zeros(len(index))
+        for goal, probability in (self.belief or {}).items():
+            if goal in index:  # a partner of somebody else may believe in other things
+                belief[index[goal]] = probability
+        info: dict[str, Any] = {"belief": belief}
         if self.command is not None:
             summary = self._metrics.summary()
-            info |= {name: summary[name] if math.isfinite(summary[name]) else None for name in MEASURES}
-            info["robot_state"] = self.command.state
-            info["robot_target"] = self.command.target
+            info |= {name: summary[name] if math.isfinite(summary[name]) else math.inf for name in MEASURES}
+            target = self.command.target
+            info["robot_target"] = -1 if target is None else index.get(target, -1)
         return info
 
     def summary(self) -> dict[str, float]:

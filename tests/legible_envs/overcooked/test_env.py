@@ -29,6 +29,11 @@ from tests.oracles.kitchen_oracle import any_kitchen
 NAME = "LegibleOvercooked-v0"
 
 
+def number_of(layout):
+    """What infos call a kitchen."""
+    return int(layout.layout_id, 16)
+
+
 # -- text and keys ----------------------------------------------------------------------------------------
 
 
@@ -109,10 +114,10 @@ def test_kitchens_in_every_form():
     rows = KITCHEN.split("\n")
     forms = [layout, KITCHEN, rows, tuple(rows), [list(row) for row in rows], np.array([list(row) for row in rows])]
     for form in forms:
-        assert env.reset(options={"layout": form})[1]["layout_id"] == layout.layout_id
-    assert env.reset(options={"layout": layout.cells})[1]["layout_id"] == OvercookedLayout(layout.cells).layout_id
+        assert env.reset(options={"layout": form})[1]["layout_id"] == number_of(layout)
+    assert env.reset(options={"layout": layout.cells})[1]["layout_id"] == number_of(OvercookedLayout(layout.cells))
     for form in (genome, genome.tolist(), genome.astype(np.int64)):
-        assert env.reset(options={"layout": form})[1]["layout_id"] == workspace.decode(genome).layout_id
+        assert env.reset(options={"layout": form})[1]["layout_id"] == number_of(workspace.decode(genome))
         assert gym.make(NAME, layout=form).unwrapped.layout == workspace.decode(genome)
 
 
@@ -237,7 +242,7 @@ def test_an_episode_delivers_everything_once():
     assert total == 60.0
     assert sorted(env.unwrapped.view().delivered) == sorted(PAPER_SOUPS)
     assert not info["goal_mask"].any()
-    assert info["goals"] == ()
+    assert env.unwrapped.goals == ()
     assert info["num_done"] == info["deliveries"] == 3
 
 

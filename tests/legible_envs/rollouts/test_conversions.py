@@ -169,12 +169,12 @@ def test_the_trajectories_of_an_episode_are_those_of_its_views() -> None:
     for seed in range(5):
         player = ScriptedPlayer(env, rng)
         observation, info = env.reset(seed=seed)
-        views, goals = [game.view()], [info["goals"]]
+        views, goals = [game.view()], [game.goals]
         for _ in range(250):
             action = player(observation, info) if rng.random() < 0.9 else int(rng.integers(6))
             observation, _, over, _, info = env.step(action)
             views.append(game.view())
-            goals.append(info["goals"])
+            goals.append(game.goals)
             if over:
                 break
         for kind, options in (("game", {"valid_goals": goals}), ("all", {})):

@@ -21,9 +21,7 @@ MARKS = {
 
 
 @given(text=TEXTS, ending=st.sampled_from(["\n", "\r\n", "\r"]), encoding=st.sampled_from(list(MARKS)))
-def test_every_encoding_with_a_mark_and_every_line_ending_reads_the_same(
-    text: str, ending: str, encoding: str
-) -> None:
+def test_every_encoding_with_a_mark_and_every_line_ending_reads_the_same(text: str, ending: str, encoding: str) -> None:
     assert decode_text(MARKS[encoding] + text.replace("\n", ending).encode(encoding)) == text
 
 

@@ -29,22 +29,36 @@ from tests.legible_envs.tabletop.table_player import (
 def test_beliefs_are_bayesian_goal_inference_along_the_reach():
     env = make(layout=WALL, predictor="bayesian")
     _, info = env.reset(seed=0)
-    assert info["belief"] == pytest.approx(dict.fromkeys(FIRST, 0.25))
+    assert env.unwrapped.belief == pytest.approx(dict.fromkeys(FIRST, 0.25))
+    assert info["belief"].tolist() == pytest.approx([0.25] * 4 + [0.0] * 4)
     expected = GoalBelief(WALL, start="home", goals=sorted(FIRST))
     for _ in range(100):
         info = env.step(towards(env, next_point(env, FIRST[3])))[4]
-        if info["holding"]:
+        if info["holding"] >= 0:
             break
-        assert info["belief"] == pytest.approx(expected.update(env.unwrapped.hand))
-    assert info["holding"] == FIRST[3]
-    assert info["belief"] == {}
+        assert env.unwrapped.belief == pytest.approx(expected.update(env.unwrapped.hand))
+        assert dict(zip(WALL.goals, info["belief"], strict=True)) == {
+            **dict.fromkeys(SECOND, 0.0),
+            **env.unwrapped.belief,
+        }
+    assert info["holding"] == WALL.index(FIRST[3])
+    assert env.unwrapped.belief is None
+    assert info["belief"].tolist() == [0.0] * 8
     fetch(env, FIRST[3])
     assert set(env.unwrapped.view().belief) == set(FIRST[:3])
     assert "belief" not in make().reset()[1]
 
 
 def test_a_robot_and_a_person_build_together():
-    alone, together = play(make(layout=APART)), play(make(layout=APART, partner="robot"))
+    states = set()
+
+    class Watched(gym.Wrapper):
+        def step(self, action):
+            result = self.env.step(action)
+            states.add(self.env.unwrapped.robot_state)
+            return result
+
+    alone, together = play(make(layout=APART)), play(Watched(make(layout=APART, partner="robot")))
     info = together[-1][4]
     assert info["num_done"] == 8
     assert len(together) < len(alone)
@@ -56,8 +70,7 @@ def test_a_robot_and_a_person_build_together():
     assert 0 < info["decision_time"] < 1
     assert 0 < info["decided_rightly"] <= 1
     assert info["conflicts"] >= 0
-    assert [r[4]["completion_time"] for r in together[:-1]] == [None] * (len(together) - 1)
-    states = {r[4]["robot_state"] for r in together}
+    assert [r[4]["completion_time"] for r in together[:-1]] == [math.inf] * (len(together) - 1)
     assert states == {"wait", "approach", "grasp", "carry", "place"}
 
 
@@ -92,7 +105,7 @@ def test_who_takes_an_object_first_has_it():
     go_to(slow, target, near=0.02)
     for _ in range(10):
         info = slow.step(np.zeros(2))[4]
-    assert info["holding"] == FIRST[2]
+    assert info["holding"] == TASK.layout.index(FIRST[2])
     assert FIRST[2] not in slow.unwrapped.goals
     assert slow.unwrapped.view().robot_holding is None
 
@@ -104,7 +117,7 @@ def test_what_a_robot_holds_is_not_valid_for_the_person_until_it_is_dropped():
     for _ in range(90):
         info = env.step(np.zeros(2))[4]
         status.append(env.unwrapped.view().status[1])
-        assert (FIRST[1] in info["goals"]) == (status[-1] == "free")
+        assert (FIRST[1] in env.unwrapped.goals) == info["goal_mask"][1] == (status[-1] == "free")
     assert [s for s, before in zip(status, ["", *status], strict=False) if s != before] == ["free", "robot", "free"]
     assert info["num_done"] == 0
     dropped = env.unwrapped.positions[1]
@@ -118,11 +131,11 @@ def test_second_objects_wait_for_first_ones_in_the_gripper():
     env = make(partner=Grabber(FIRST[0], speed=0.3))
     env.reset(seed=0)
     for name in FIRST[1:]:
-        result = fetch(env, name)
+        fetch(env, name)
     while env.unwrapped.view().status[0] != "placed":
-        assert result[4]["goals"] == ()
-        result = env.step(np.zeros(2))
-    assert set(result[4]["goals"]) == set(SECOND)
+        assert env.unwrapped.goals == ()
+        env.step(np.zeros(2))
+    assert set(env.unwrapped.goals) == set(SECOND)
 
 
 @pytest.mark.parametrize("predictor", [Mute(), "tests.legible_envs.tabletop.table_player:Doubtful"])
@@ -131,12 +144,12 @@ def test_a_predictor_that_fails_is_reported_once_and_the_episode_goes_on(predict
     with pytest.warns(RuntimeWarning, match="robot waits") as caught:
         results = play(env)
     assert len(caught) == 1
-    assert all(result[4]["belief"] == {} for result in results)
+    assert not any(result[4]["belief"].any() for result in results)
     info = results[-1][4]
     assert info["num_done"] == 8
-    assert info["completion_time"] is not None
+    assert math.isfinite(info["completion_time"])
     with pytest.warns(RuntimeWarning, match="Doubtful"):
-        assert make(predictor=Doubtful()).reset()[1]["belief"] == {}
+        assert not make(predictor=Doubtful()).reset()[1]["belief"].any()
 
 
 class Confident:
@@ -155,10 +168,11 @@ class Confident:
 def test_partners_and_predictors_of_ones_own():
     env = make(partner="robot", predictor=Confident())
     _, info = env.reset(seed=0)
-    assert max(info["belief"], key=info["belief"].get) == info["goals"][0]
-    assert info["robot_target"] is not None
+    assert env.unwrapped.goal_names[info["belief"].argmax()] == env.unwrapped.goals[0]
+    assert env.unwrapped.robot_target == env.unwrapped.goal_names[info["robot_target"]]
+    assert env.unwrapped.robot_state != "wait"
     assert env.unwrapped.view().threshold == 0.8
-    assert make(partner="tests.legible_envs.tabletop.table_player:Grabber").reset()[1]["robot_target"] is None
+    assert make(partner="tests.legible_envs.tabletop.table_player:Grabber").reset()[1]["robot_target"] == -1
     assert make(partner={"threshold": 0.3}).unwrapped.view().threshold == 0.3
 
 
@@ -184,8 +198,8 @@ def test_playable_by_hand():
         assert (x, y) == pytest.approx(expected.get(pressed[0], (0.1 / math.sqrt(2), -0.1 / math.sqrt(2))), abs=1e-6)
     env.reset(options={"start": np.add(TASK.layout.place(FIRST[0]), (0.0, -0.1))})
     for _ in range(6):
-        assert env.step(keys[(pygame.K_w,)])[4]["holding"] is None
-    assert env.step(np.zeros(2))[4]["holding"] == FIRST[0]
+        assert env.step(keys[(pygame.K_w,)])[4]["holding"] == -1
+    assert env.step(np.zeros(2))[4]["holding"] == 0
 
 
 # -- what is recorded -------------------------------------------------------------------------------------------------
