@@ -35,10 +35,15 @@ def _run(folder: Path, *arguments: str, **options: Any) -> subprocess.CompletedP
     return subprocess.run([*PROGRAM, *arguments], **{**given, **options})
 
 
+def _hear_ctrl_c() -> None:
+    """What runs in the background ignores Ctrl-C, and so do its children: the tests' own processes shall hear it."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def _interrupted(folder: Path, arguments: tuple[str, ...], *delays: float) -> tuple[int, str]:
     """Start a command, send Ctrl-C to it and its children after each delay; its exit code and standard error."""
     process = subprocess.Popen([*PROGRAM, *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
-                               cwd=folder, start_new_session=True)  # fmt: skip
+                               cwd=folder, start_new_session=True, preexec_fn=_hear_ctrl_c)  # fmt: skip
     for delay in delays:
         time.sleep(delay)
         if process.poll() is None:
@@ -83,7 +88,8 @@ def test_ctrl_c_while_a_layout_is_scored(command: str, delay: float, folder: Pat
 @pytest.mark.slow
 def test_ctrl_c_during_a_search_says_how_to_go_on(folder: Path) -> None:
     process = subprocess.Popen([*PROGRAM, *LONG_COMMANDS["optimize"]], stdout=subprocess.DEVNULL,
-                               stderr=subprocess.PIPE, text=True, cwd=folder, start_new_session=True)  # fmt: skip
+                               stderr=subprocess.PIPE, text=True, cwd=folder, start_new_session=True,
+                               preexec_fn=_hear_ctrl_c)  # fmt: skip
     deadline = time.monotonic() + 200
     while not (folder / "run" / "metrics.csv").exists() and time.monotonic() < deadline:
         time.sleep(0.1)
