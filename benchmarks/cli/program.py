@@ -6,6 +6,7 @@ Exit codes: 0 done; 1 ran, but did not find or finish everything; 2 the input ca
 from __future__ import annotations
 
 import contextlib
+import io
 import os
 import re
 import signal
@@ -67,6 +68,7 @@ class Program(Commands):
         if not standalone_mode:
             return super().main(args, prog_name, complete_var, standalone_mode=False, **extra)
         code = 0
+        _write_what_can_be_written()
         try:
             found = super().main(args, prog_name, complete_var, standalone_mode=False, **extra)
             code = found if isinstance(found, int) else 0
@@ -127,6 +129,13 @@ def _one_line_warnings() -> Iterator[None]:
     with warnings.catch_warnings():
         warnings.showwarning = show
         yield
+
+
+def _write_what_can_be_written() -> None:
+    """Characters that the terminal's encoding lacks become question marks, not an error in mid-command."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
 
 
 def _flush() -> None:

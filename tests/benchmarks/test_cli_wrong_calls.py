@@ -71,7 +71,7 @@ def _about_layouts() -> list[Call]:
         "noise": "noise",
         "latin.txt": "latin.txt",
         "broken.json": "not valid JSON",
-        "deep.json": "nested too deeply",
+        "deep.json": "nested",
         "big.txt": "300",
         "run-without-keys": "lacks",
         "run-of-nonsense": "not valid JSON",
