@@ -184,8 +184,8 @@ def workspaces() -> None:
 @pots_option
 @player_option
 @task_option
-@click.option("--trajectories", type=click.Path(exists=True, dir_okay=False, path_type=Path),
-              help="Trajectories (.npz, .csv, or recorded play): also predict their goals.")  # fmt: skip
+@click.option("--trajectories", metavar="FILE|FOLDER|ID",
+              help="Trajectories (.npz, CSV, recorded play, a Minari data set): also predict their goals.")  # fmt: skip
 @click.option("--predictor", "predictors", multiple=True, metavar="NAME|MODULE:CLASS",
               help="Evaluate this predictor by cross-validation; repeatable.")  # fmt: skip
 @click.option("--cut", type=click.Choice(["steps", "cells", "time", "arc"]), default="steps", show_default=True,
@@ -206,7 +206,7 @@ def score(
     pots: int | None,
     player: int | None,
     task: str | None,
-    trajectories: Path | None,
+    trajectories: str | None,
     predictors: tuple[str, ...],
     by_participant: bool,
     out: Path | None,
@@ -235,18 +235,18 @@ def score(
     design = load_design(layout, workspace=workspace, prefix=prefix, pots=pots, task=task, player=player)
     if predictors and (folder := evaluation_folder(layout, out)) is not None:
         check_folder(folder, "--out")
+    recorded = None if trajectories is None else trajectories_in(design, trajectories)
     for line in score_lines(design):
         click.echo(line)
-    if trajectories is None:
+    if recorded is None:
         return
     from benchmarks.console import say
 
     if not predictors:
-        print_predictions(say(), design, trajectories)
+        print_predictions(say(), design, recorded)
         return
     from benchmarks.reports.prediction_report import evaluate_trajectories, print_evaluation
 
-    recorded = trajectories_in(design, trajectories)
     results = evaluate_trajectories(recorded, predictors, groups="participant" if by_participant else None, **settings)
     print_evaluation(say(), results)
     for line in save_evaluation(results, layout, out):

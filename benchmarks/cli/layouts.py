@@ -10,6 +10,8 @@ from benchmarks.console import number, plural, table
 from benchmarks.presenters.losses import explains_stages, loss_row, losses_and_gains
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from rich.console import Console
 
     from benchmarks.presenters.base import Design
@@ -63,15 +65,14 @@ def _print_explanation(console: Console, design: Design) -> None:
         console.print(table([loss_row(row) for row in best]))
 
 
-def print_predictions(console: Console, design: Design, file: Path) -> None:
+def print_predictions(console: Console, design: Design, recorded: Sequence[Trajectory]) -> None:
     """Print how well the design's predictors predict goals on trajectories recorded here, by share observed.
 
     Raises:
-        ValueError: The file holds no trajectories recorded here, or the workspace comes with no predictors.
+        ValueError: The workspace comes with no predictors.
     """
     from legible_envs.rollouts.trajectory import CUTS
 
-    recorded = trajectories_in(design, file)
     if not (predictors := design.predictors()):
         raise ValueError(f"no predictor comes with this {design.noun}; name one with --predictor")
     fractions = (0.1, 0.3, 0.5, 0.7, 0.9)
@@ -87,19 +88,20 @@ def print_predictions(console: Console, design: Design, file: Path) -> None:
     console.print(f"definition: fraction f observed means {CUTS['steps']}; ties fractional", style="dim", markup=False)
 
 
-def trajectories_in(design: Design, file: Path) -> list[Trajectory]:
-    """The trajectories of a file that were recorded in this layout; a CSV that names no layout is taken to mean it.
+def trajectories_in(design: Design, source: str) -> list[Trajectory]:
+    """The trajectories of a file or Minari data set that were recorded in this layout; a CSV that names none means it.
 
     Raises:
-        ValueError: The file holds no trajectories, or none recorded here.
+        FileNotFoundError: There is no such file or data set.
+        ValueError: It holds no trajectories, or none recorded here.
     """
-    from legible_envs.rollouts import read_any
+    from legible_envs.rollouts import load_trajectories
 
-    recorded = [each for each in read_any(file, layout=design.layout) if design.recorded_here(each)]
+    recorded = [each for each in load_trajectories(source, layout=design.layout) if design.recorded_here(each)]
     if not recorded:
         named = getattr(design.layout, "layout_id", None)
         about = f" (layout id {named})" if named is not None else ""
-        raise ValueError(f"{file} has no trajectory recorded on this {design.noun}{about}")
+        raise ValueError(f"{source} has no trajectory recorded on this {design.noun}{about}")
     return recorded
 
 

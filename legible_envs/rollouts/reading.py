@@ -19,7 +19,7 @@ from legible_envs.support.file_kinds import describe_file
 from legible_envs.support.plugins import Registry
 from legible_envs.support.text import decode_text
 
-__all__ = ["TrajectoryFormat", "load_trajectories", "read_any", "register_trajectory_format"]
+__all__ = ["TrajectoryFormat", "load_trajectories", "register_trajectory_format"]
 
 TrajectoryFormat = Callable[[Path], list[Trajectory] | None]
 
@@ -91,10 +91,6 @@ def load_trajectories(source: str | os.PathLike[str], *, layout: Any = None) -> 
     if path.suffix.lower() in _CSV_SUFFIXES:
         return read_csv(path, layout=layout)  # says what is wrong with it
     raise ValueError(f"cannot read trajectories from {path}: it looks like {describe_file(path)}; {_EXPECTED}")
-
-
-read_any = load_trajectories
-"""An earlier name of :func:`load_trajectories`."""
 
 
 def _beginning(path: Path) -> str:

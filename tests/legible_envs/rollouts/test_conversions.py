@@ -17,7 +17,7 @@ from legible_envs.overcooked.policies import ScriptedPlayer
 from legible_envs.overcooked.trajectories import trajectories_from_views
 from legible_envs.rollouts import (
     RecordTrajectories,
-    read_any,
+    load_trajectories,
     record_episode,
     save_trajectories,
     to_minari,
@@ -104,16 +104,16 @@ def test_recordings_of_play_become_the_walks_that_were_played(tmp_path: Path) ->
     assert found == env.trajectories()
     assert len(found) == 12
     played.save(tmp_path / "me.npz")
-    assert read_any(tmp_path / "me.npz") == trajectories_from_played(played, participant="me")
+    assert load_trajectories(tmp_path / "me.npz") == trajectories_from_played(played, participant="me")
     save_trajectories(tmp_path / "walks.npz", found)
-    assert read_any(tmp_path / "walks.npz") == found
+    assert load_trajectories(tmp_path / "walks.npz") == found
     wrong = Played(played.layout, played.recipes, actions=played.actions, episodes=played.episodes,
                    rewards=played.rewards + 1)  # fmt: skip
     with pytest.raises(ValueError, match="step 0 was recorded with reward"):
         trajectories_from_played(wrong)
     (tmp_path / "other.npz").write_bytes(b"no")
     with pytest.raises(ValueError, match="cannot read trajectories"):
-        read_any(tmp_path / "other.npz")
+        load_trajectories(tmp_path / "other.npz")
 
 
 def test_a_minari_data_set_is_read_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

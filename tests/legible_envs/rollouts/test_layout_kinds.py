@@ -17,7 +17,6 @@ from legible_envs.overcooked import OvercookedLayout
 from legible_envs.rollouts import (
     Trajectory,
     load_trajectories,
-    read_any,
     read_csv,
     register_trajectory_format,
     save_trajectories,
@@ -88,7 +87,7 @@ def test_layouts_of_another_package_travel_with_their_trajectories(tmp_path: Pat
     save_trajectories(tmp_path / "w.npz", found)
     write_csv(tmp_path / "w.csv", found)
     assert load_trajectories(tmp_path / "w.npz") == read_csv(tmp_path / "w.csv") == found
-    assert read_any(tmp_path / "w.csv") == found
+    assert load_trajectories(tmp_path / "w.csv") == found
     with np.load(tmp_path / "w.npz") as file:
         assert int(file["schema"]) == 3
 
@@ -126,9 +125,9 @@ def test_a_kind_is_replaced_only_when_asked() -> None:
 def test_other_formats_of_recordings_can_be_read(tmp_path: Path) -> None:
     (tmp_path / "w.log").write_text("log")
     with pytest.raises(ValueError, match="cannot read trajectories"):
-        read_any(tmp_path / "w.log")
+        load_trajectories(tmp_path / "w.log")
     register_trajectory_format("log", lambda path: [reach(KITCHEN)] if path.suffix == ".log" else None)
-    assert read_any(tmp_path / "w.log") == [reach(KITCHEN)]
+    assert load_trajectories(tmp_path / "w.log") == [reach(KITCHEN)]
     with pytest.raises(ValueError, match="'recorded play' is built in"):
         register_trajectory_format("recorded play", lambda path: None)
 
