@@ -256,6 +256,10 @@ class CandidatePredictor(GoalPredictor):
     def candidate_probabilities(self, trajectory: Trajectory) -> npt.NDArray[np.float64]:
         """``(len(trajectory.candidates),)`` probabilities in the order of the candidates."""
 
+    def with_possible_goals(self, trajectory: Trajectory) -> Trajectory:
+        """The trajectory without candidates that cannot be its goal, which get probability 0; here all can."""
+        return trajectory
+
     def predict_proba(self, X: Sequence[Trajectory]) -> npt.NDArray[np.float64]:
         """See :meth:`GoalPredictor.predict_proba`."""
         trajectories = check_trajectories(X)
@@ -263,7 +267,9 @@ class CandidatePredictor(GoalPredictor):
         probabilities = np.zeros((len(trajectories), len(self.classes_)))
         for row, trajectory in enumerate(trajectories):
             try:
-                probabilities[row, columns[row]] = self.candidate_probabilities(trajectory)
+                asked = self.with_possible_goals(trajectory)
+                here = columns[row] if asked is trajectory else self.candidate_columns(asked)
+                probabilities[row, here] = self.candidate_probabilities(asked)
             except ValueError as error:
                 raise TrajectoryError.of(row, trajectory, error) from error
         return probabilities

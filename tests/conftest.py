@@ -13,6 +13,8 @@ from pathlib import Path
 
 import pytest
 
+os.environ.setdefault("MPLBACKEND", "Agg")  # before anything imports matplotlib: tests open no windows
+
 from tests.support.example_package import install
 
 PACKAGES = ("legible_envs", "optimizers", "predictors", "benchmarks")

@@ -177,7 +177,7 @@ def novelty_and_competition(measures: Floats, scores: Floats, past: Floats, neig
 
     Returns:
         ``(n, 2)``: mean distance to the nearest of population and past, itself left out; and how many of the nearest in
-        the population score lower. Which of several equally near ones count is arbitrary, but always the same.
+        the population score lower. Of several equally near ones the first count, on every processor.
     """
     n = len(measures)
     if n == 1:
@@ -188,11 +188,20 @@ def novelty_and_competition(measures: Floats, scores: Floats, past: Floats, neig
         squares += (mine[:, None] - theirs) ** 2
     np.fill_diagonal(squares, np.inf)
     k = min(neighbours, n - 1)
-    nearest = np.argpartition(squares[:, :n], k - 1, axis=1)[:, :k]
-    outscored = (scores[nearest] < scores[:, None]).sum(axis=1)
+    outscored = (first_nearest(squares[:, :n], k) & (scores < scores[:, None])).sum(axis=1)
     k = min(neighbours, len(population_and_past) - 1)
-    novelty = np.sqrt(np.partition(squares, k - 1, axis=1)[:, :k]).mean(axis=1)
+    # In order: a partition leaves them as the processor likes, and sums of the same terms in another order differ.
+    novelty = np.sqrt(np.sort(np.partition(squares, k - 1, axis=1)[:, :k], axis=1)).mean(axis=1)
     return np.column_stack([novelty, outscored])
+
+
+def first_nearest(distances: Floats, k: int) -> npt.NDArray[np.bool_]:
+    """``(n, m)`` the ``k`` smallest of every row of ``(n, m)`` distances; of equal ones the first."""
+    farthest = np.partition(distances, k - 1, axis=1)[:, k - 1 : k]
+    nearer, as_near = distances < farthest, distances == farthest
+    left = k - nearer.sum(axis=1, keepdims=True)
+    nearer |= as_near & (np.cumsum(as_near, axis=1, dtype=np.int32) <= left)
+    return nearer
 
 
 def pareto_ranks(objectives: Floats) -> npt.NDArray[np.int64]:

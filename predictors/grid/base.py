@@ -220,16 +220,9 @@ class GridPredictor(CandidatePredictor):
     they have without them (:func:`~predictors.grid.candidates.within_reach`).
     """
 
-    def predict_proba(self, X: Sequence[Trajectory]) -> npt.NDArray[np.float64]:
-        """See :meth:`GoalPredictor.predict_proba`; goals out of the person's reach have probability 0."""
-        trajectories = check_trajectories(X)
-        columns = [self.candidate_columns(trajectory) for trajectory in trajectories]
-        probabilities = np.zeros((len(trajectories), len(self.classes_)))
-        for row, trajectory in enumerate(trajectories):
-            part = within_reach(trajectory)
-            here = columns[row] if part is trajectory else self.candidate_columns(part)
-            probabilities[row, here] = self.candidate_probabilities(part)
-        return probabilities
+    def with_possible_goals(self, trajectory: Trajectory) -> Trajectory:
+        """The trajectory without candidates out of the person's reach."""
+        return within_reach(trajectory)
 
     def predict_proba_at(
         self, X: Sequence[Trajectory], fractions: Sequence[float] = FRACTIONS, cut: Cut = "steps"

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from legible_envs.layout_kinds import kind_of
 from legible_envs.overcooked import OvercookedLayout, OvercookedWorkspace
 from legible_envs.overcooked.human_play import Played, load_played
+from legible_envs.overcooked.layout import SYMBOLS
 from legible_envs.overcooked.recipes import PAPER_SOUPS
 from legible_envs.rollouts import Trajectory, load_trajectories, save_trajectories, write_csv
 from legible_envs.tabletop import TableObject, TabletopLayout, TabletopTask, VirtualObstacle
@@ -81,10 +82,10 @@ def test_kitchens_survive(seed: int, shape: tuple[int, int], tmp_path_factory: p
 def test_kitchens_without_walls_survive(data: st.DataObject, tmp_path_factory: pytest.TempPathFactory) -> None:
     """Rows that begin and end with floor are blanks at the ends of lines."""
     height, width = data.draw(st.integers(3, 6)), data.draw(st.integers(3, 6))
-    row = st.lists(st.sampled_from("  XVOTDPS"), min_size=width, max_size=width).map("".join)
-    rows = data.draw(st.lists(row, min_size=height, max_size=height))
-    rows[height // 2] = rows[height // 2][:-1] + "1"
-    layout = OvercookedLayout.from_rows(rows)
+    codes = st.sampled_from([0, 0, *range(len(SYMBOLS))])
+    cells = np.array(data.draw(st.lists(codes, min_size=height * width, max_size=height * width)))
+    cells[-1] = 0
+    layout = OvercookedLayout(cells.reshape(height, width))
     assert OvercookedLayout.from_ascii(layout.to_ascii()) == layout
     survives_as_layout(layout, tmp_path_factory.mktemp("open"))
 

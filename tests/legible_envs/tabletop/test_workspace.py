@@ -133,7 +133,7 @@ def test_any_numbers_are_a_table_or_an_error(values):
 @pytest.mark.parametrize(
     ("genome", "message"),
     [
-        (np.zeros(31), r"expected one genome of shape \(32,\)"),
+        (np.zeros(31), r"expected genomes of shape .*\(32,\), got \(31,\)"),
         (np.full(32, np.nan), "entry 0 of the genome is nan"),
         (np.r_[0.9, np.zeros(31)], r"gene 0 \(x of 'red-circle'\) is .*0.9.*; expected 0.1 to 0.8"),
     ],

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from optimizers import NoveltyLocalCompetitionEmitter
-from optimizers.emitters.novelty import crowding_distances, novelty_and_competition, pareto_ranks
+from optimizers.emitters.novelty import crowding_distances, first_nearest, novelty_and_competition, pareto_ranks
 from tests.support.shelf_workspace import ShelfWorkspace
 
 SHELF = ShelfWorkspace()
@@ -77,3 +77,12 @@ def test_the_next_generation_is_novel_or_locally_better(started, told):
         sure = genomes[living][ranks < worst_kept]
         assert all((after.genomes == genome).all(axis=1).any() for genome in sure)
         assert len(after.past) <= 500
+
+
+@given(POINTS, st.integers(1, 25))
+def test_of_equally_near_ones_the_first_are_neighbours(points, k):
+    distances = np.abs(points[:, :1] - points[:, 1])
+    k = min(k, len(points))
+    expected = np.zeros(distances.shape, dtype=bool)
+    np.put_along_axis(expected, np.argsort(distances, axis=1, kind="stable")[:, :k], True, axis=1)
+    np.testing.assert_array_equal(first_nearest(distances, k), expected)

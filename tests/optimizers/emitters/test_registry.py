@@ -78,7 +78,7 @@ def test_a_bad_registration_is_refused(name, factory, message):
 @pytest.mark.parametrize(
     ("spec", "message"),
     [
-        ("imprve", r"no emitter named 'imprve'; known: .*improve, .*random"),
+        ("imprve", r"no emitter named 'imprve'; did you mean 'improve'\? known: .*improve, .*random"),
         ("no_such_module:X", "cannot be imported: No module named"),
         ("optimizers.errors:Nothing", "cannot be imported"),
         ("optimizers.errors:__all__", "not a class or function but a list"),
