@@ -15,11 +15,9 @@ from benchmarks.cli.options import (
     Prefix,
     given_options,
     layout_argument,
+    of_one_layout,
     out_folder,
-    player_option,
     pots_option,
-    task_option,
-    workspace_option,
 )
 from benchmarks.cli.program import STOPPED, Commands, Program
 from benchmarks.cli.reproduce import reproduce
@@ -178,12 +176,7 @@ def workspaces() -> None:
 
 
 @main.command()
-@layout_argument
-@workspace_option
-@click.option("--prefix", type=Prefix(), help="Which prefixes count. [default: mean, or the run's own]")
-@pots_option
-@player_option
-@task_option
+@of_one_layout
 @click.option("--trajectories", metavar="FILE|FOLDER|ID",
               help="Trajectories (.npz, CSV, recorded play, a Minari data set): also predict their goals.")  # fmt: skip
 @click.option("--predictor", "predictors", multiple=True, metavar="NAME|MODULE:CLASS",
@@ -254,12 +247,7 @@ def score(
 
 
 @main.command()
-@layout_argument
-@workspace_option
-@click.option("--prefix", type=Prefix(), help="Which prefixes count. [default: mean, or the run's own]")
-@pots_option
-@player_option
-@task_option
+@of_one_layout
 @click.option("--out", type=DestinationFile(".png"), help="Where to write the picture (.png).")
 def show(
     layout: str,

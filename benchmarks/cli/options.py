@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 import math
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import date, datetime, time
-from typing import Any
+from typing import Any, TypeVar
 
 import click
 
@@ -21,16 +21,16 @@ __all__ = [
     "SchedulerAddress",
     "given_options",
     "layout_argument",
+    "of_one_layout",
     "out_folder",
-    "player_option",
     "pots_option",
     "scheduler_option",
     "settings_from",
-    "task_option",
     "typed_value",
     "workers_option",
-    "workspace_option",
 ]
+
+Command = TypeVar("Command", bound=Callable[..., Any])
 
 
 class Assignment(click.ParamType):
@@ -177,3 +177,11 @@ workers_option = click.option(
 scheduler_option = click.option(
     "--scheduler", type=SchedulerAddress(), metavar="ADDRESS", help="Run on a Dask cluster, e.g. tcp://10.0.0.1:8786."
 )
+
+
+def of_one_layout(command: Command) -> Command:
+    """The arguments of commands that score a layout: which one, and what its score is of."""
+    prefix = click.option("--prefix", type=Prefix(), help="Which prefixes count. [default: mean, or the run's own]")
+    for add in (task_option, player_option, pots_option, prefix, workspace_option, layout_argument):
+        command = add(command)
+    return command
