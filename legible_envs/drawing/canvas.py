@@ -19,7 +19,18 @@ import numpy.typing as npt
 
 from legible_envs.drawing.palette import HEAT
 
-__all__ = ["Canvas", "Image", "Sprite", "heat_colour", "load_pygame", "mix", "paste", "rgb", "text_sprite"]
+__all__ = [
+    "Canvas",
+    "Image",
+    "Sprite",
+    "heat_colour",
+    "load_pygame",
+    "mix",
+    "paste",
+    "points_of_arc",
+    "rgb",
+    "text_sprite",
+]
 
 Image = npt.NDArray[np.uint8]
 Point = tuple[float, float]
@@ -170,9 +181,7 @@ class Canvas:
         opacity: float = 1.0,
     ) -> None:
         """Part of a ring, from and to in turns clockwise from the top."""
-        count = max(3, math.ceil(abs(turns[1] - turns[0]) * 72) + 1)
-        angles = [2 * math.pi * (turns[0] + (turns[1] - turns[0]) * i / (count - 1)) for i in range(count)]
-        self.stroke([(x + radius * math.sin(a), y - radius * math.cos(a)) for a in angles], width, colour, opacity)
+        self.stroke(points_of_arc(x, y, radius, turns), width, colour, opacity)
 
     def sprite(self) -> Sprite:
         """The finished sprite: every pixel the average of the finer ones under it."""
@@ -204,3 +213,10 @@ def text_sprite(text: str, size: int, colour: str) -> Sprite:
     opacity = alpha.reshape(rows, factor, cols, factor).mean(axis=(1, 3))[..., None] / 255
     ink = np.array(rgb(colour), np.float64)
     return Sprite(np.rint(opacity * ink).astype(np.uint16), np.floor((1 - opacity) * 256).astype(np.uint16))
+
+
+def points_of_arc(x: float, y: float, radius: float, turns: tuple[float, float]) -> list[Point]:
+    """Points along part of a circle, from and to in turns clockwise from the top."""
+    count = max(3, math.ceil(abs(turns[1] - turns[0]) * 72) + 1)
+    angles = [2 * math.pi * (turns[0] + (turns[1] - turns[0]) * i / (count - 1)) for i in range(count)]
+    return [(x + radius * math.sin(a), y - radius * math.cos(a)) for a in angles]

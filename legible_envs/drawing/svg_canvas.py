@@ -7,13 +7,13 @@ pictures show.
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Iterable, Sequence
 from typing import Final, Protocol
 
+from legible_envs.drawing.canvas import Point, points_of_arc
+
 __all__ = ["UNIT", "Pen", "SvgCanvas"]
 
-Point = tuple[float, float]
 UNIT: Final = 1000
 """Side of a unit in the coordinates of SVG, which are whole numbers."""
 
@@ -105,9 +105,7 @@ class SvgCanvas:
         opacity: float = 1.0,
     ) -> None:
         """Part of a ring, from and to in turns clockwise from the top."""
-        count = max(3, math.ceil(abs(turns[1] - turns[0]) * 72) + 1)
-        angles = [2 * math.pi * (turns[0] + (turns[1] - turns[0]) * i / (count - 1)) for i in range(count)]
-        self.stroke([(x + radius * math.sin(a), y - radius * math.cos(a)) for a in angles], width, colour, opacity)
+        self.stroke(points_of_arc(x, y, radius, turns), width, colour, opacity)
 
     def symbol(self, name: str) -> str:
         """What was drawn as a ``<symbol>`` one unit wide and high, to be shown by ``<use href="#name">``."""
