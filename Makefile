@@ -15,7 +15,7 @@ comma := ,
 LOCKED := requirements/constraints.txt
 EXAMPLES := docs/examples/legible-emitter-example docs/examples/legible-workspace-example
 
-.PHONY: help demo test test-benchmarks lint format docs bench lock clean
+.PHONY: help demo test test-benchmarks test-reliability lint format docs bench lock clean
 .DEFAULT_GOAL := help
 
 help:
@@ -50,6 +50,10 @@ test: $(VENV)/.test-installed
 # make test-benchmarks   the tests that take minutes each
 test-benchmarks: $(VENV)/.test-installed
 	$(BIN)/python -m pytest -m benchmark
+
+# make test-reliability   kills, flipped bits and malformed files by the thousand (docs/reliability.md); takes hours
+test-reliability: $(VENV)/.test-installed
+	$(BIN)/python -m pytest tests/reliability --thorough --timeout 0 $(PYTEST_ARGS)
 
 # make lint   style, formatting, spelling, types and import rules
 lint: $(VENV)/.test-installed

@@ -33,6 +33,11 @@ def missing_recordings() -> str:
     return ""
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """The option of tests/reliability."""
+    parser.addoption("--thorough", action="store_true", help="try what tests/reliability tries a hundred times as often")
+
+
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """Skip what needs recorded games where there are none, or fail where they are required."""
     if item.get_closest_marker("data") is None or not (reason := missing_recordings()):

@@ -7,6 +7,7 @@ import re
 import tomllib
 from pathlib import Path
 
+import matplotlib
 import pytest
 
 ROOT = Path(__file__).parent.parent
@@ -48,6 +49,8 @@ def own_registries(request):
 def test_python_blocks_run_one_after_the_other(page, capsys, tmp_path, monkeypatch):
     if "stable_baselines3" in page.read_text(encoding="utf-8"):
         pytest.importorskip("stable_baselines3", reason="the extra `rl`, which `make test TORCH=` goes without")
+    # `gymnasium.utils.play`, which other tests import, switches the whole process to Tk.
+    matplotlib.use("agg")
     # A module of its own: what is defined on a page can be pickled and imported by name, as in a reader's file.
     module = f"page_{name_of(page)}"
     (tmp_path / f"{module}.py").write_text("\n".join(blocks(page, "python")), encoding="utf-8")
