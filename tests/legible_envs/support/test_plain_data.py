@@ -96,9 +96,11 @@ def test_a_long_key_is_no_long_text():
 def test_random_characters_give_data_or_a_value_error(parse):
     rng = random.Random(5)
     alphabet = "[]{}(),:=&*!?|>-'\"%@`#<~ \n\t0123456789.eabnx_\\/\u2028é\x00"
+    refused = 0
     for _ in range(3000):
         text = "".join(rng.choices(alphabet, k=rng.randrange(1, 40)))
         try:
             parse(text)
-        except ValueError as error:
-            assert str(error)
+        except ValueError:
+            refused += 1
+    assert refused > 1000
