@@ -19,6 +19,7 @@ SEARCH: Final = TrialName("sweep/search", ("benchmarks.sweeps.run:run_cell",))
 
 _SETTINGS: Final = ["workspace", "objective", "emitter", "evaluations"]
 _UNSUMMARISED: Final = {*_SETTINGS, "seed", "scored", "best_genome"}
+_REASON: Final = "omitted."
 
 
 def results(sweep: Sweep, folder: str | Path) -> pd.DataFrame:
@@ -31,14 +32,19 @@ def results(sweep: Sweep, folder: str | Path) -> pd.DataFrame:
 
 
 def summarise(table: pd.DataFrame) -> pd.DataFrame:
-    """A row per setting: number of seeds, and mean and standard deviation over them of every result."""
+    """A row per setting: number of seeds, and mean and standard deviation of every result over those that have it.
+
+    Where some lack a predictor's accuracy, ``accuracy.NAME_seeds`` counts those that have it.
+    """
     import pandas as pd
 
     rows = []
     for labels, part in table.groupby(_SETTINGS, sort=False):
         row = dict(zip(_SETTINGS, labels, strict=True)) | {"seeds": len(part)}
-        for column in (name for name in part.columns if name not in _UNSUMMARISED):
+        for column in (name for name in part.columns if name not in _UNSUMMARISED and not name.startswith(_REASON)):
             row |= {f"{column}_mean": part[column].mean(), f"{column}_sd": part[column].std()}
+            if column.startswith("accuracy.") and table[column].isna().any():
+                row[f"{column}_seeds"] = int(part[column].notna().sum())
         rows.append(row)
     return pd.DataFrame(rows)
 
@@ -54,6 +60,8 @@ def for_reading(table: pd.DataFrame) -> list[dict[str, str]]:
         for name in shown:
             mean, sd = entry[f"{name}_mean"], entry[f"{name}_sd"]
             row[name] = "–" if mean != mean else f"{mean:.4g}" + ("" if sd != sd else f" ± {sd:.2g}")
+            if 0 < (have := entry.get(f"{name}_seeds", 0)) < entry["seeds"]:
+                row[name] += f" ({have} of {entry['seeds']} seeds)"
         rows.append(row)
     return rows
 

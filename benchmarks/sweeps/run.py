@@ -41,7 +41,7 @@ def run_sweep(
     Returns:
         A row per trial: its labels, then ``best`` (the objective's value of the best layout), ``legibility``,
         ``distance``, ``qd_score``, ``coverage``, ``scored`` (layouts), ``best_genome`` (JSON) and ``accuracy.NAME`` of
-        every predictor.
+        every predictor (NaN where it could not be evaluated, with the reason in ``omitted.NAME``).
 
     Raises:
         TrialsFailed: Some trials failed twice; both tables are written all the same.
@@ -88,16 +88,26 @@ def run_search(trial: dict[str, Any]) -> dict[str, Any]:
     return row
 
 
-def _accuracies(workspace: Workspace, genome: np.ndarray[Any, Any], trial: Mapping[str, Any]) -> dict[str, float]:
-    """Mean accuracy over 10 to 90 % observed of each predictor on participants simulated in the best layout."""
+def _accuracies(workspace: Workspace, genome: np.ndarray[Any, Any], trial: Mapping[str, Any]) -> dict[str, Any]:
+    """Mean accuracy over 10 to 90 % observed of each predictor on participants simulated in the best layout.
+
+    A predictor that could not be evaluated has no number, and its reason as ``omitted.NAME``.
+    """
     if not trial.get("predictors"):
         return {}
     from predictors.evaluation.cross_validation import evaluate
+    from predictors.evaluation.omissions import NothingEvaluatedError
 
     settings = dict(trial["people"])
     participants = int(settings.pop("participants", 8))
     rng = np.random.default_rng(np.random.SeedSequence((trial["seed"], 1)))
     trajectories = workspace.simulate(genome, participants, rng, **settings)
-    found = evaluate(list(trial["predictors"]), trajectories, rare="keep", seed=trial["seed"])
-    means = found.table.groupby("predictor")["correct"].mean()
-    return {f"accuracy.{name}": float(value) for name, value in means.items()}
+    means: dict[Any, float] = {}
+    try:
+        found = evaluate(list(trial["predictors"]), trajectories, rare="keep", seed=trial["seed"])
+        means = found.table.groupby("predictor")["correct"].mean().to_dict()
+        reasons = dict(zip(found.omitted["predictor"], found.omitted["reason"], strict=True))
+    except NothingEvaluatedError as error:
+        reasons = {each.predictor: each.reason for each in error.omissions}
+    accuracies = {f"accuracy.{name}": float(means[name]) if name in means else None for name in trial["predictors"]}
+    return accuracies | {f"omitted.{name}": str(reason) for name, reason in reasons.items()}

@@ -24,7 +24,7 @@ from predictors.evaluation.answers import (
 from predictors.evaluation.comparison import Comparison, compare_conditions
 from predictors.evaluation.learning_curves import learning_curve
 from predictors.evaluation.metrics import tied_shares
-from predictors.evaluation.omissions import Omission, no_predictor_left, omission_table
+from predictors.evaluation.omissions import NothingEvaluatedError, Omission, omission_table
 from predictors.evaluation.results import Evaluation, LearningCurve
 from predictors.evaluation.splits import Groups, Rare, Split, check_evaluable, check_seed, folds
 
@@ -185,7 +185,7 @@ def evaluate(
         results += [result.of_part(by, part) for result in found]
         omissions += [Omission(name, part, reason) for name, reason in reasons.items()]
     if not results:
-        raise no_predictor_left(omissions, by)
+        raise NothingEvaluatedError(omissions, by)
     return Evaluation(
         table=pd.concat([result.rows for result in results], ignore_index=True),
         confusion=pd.concat([result.confusion for result in results], ignore_index=True),

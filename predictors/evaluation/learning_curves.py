@@ -20,7 +20,7 @@ from predictors.evaluation.answers import (
     probabilities_of,
     renumbered,
 )
-from predictors.evaluation.omissions import Omission, no_predictor_left, omission_table
+from predictors.evaluation.omissions import NothingEvaluatedError, Omission, omission_table
 from predictors.evaluation.results import LearningCurve
 from predictors.evaluation.splits import Groups, Split, check_learnable, check_seed, nested_training_sets
 
@@ -108,7 +108,7 @@ def learning_curve(
     omissions = [Omission(name, "", reason) for name, reason in reasons.items()]
     rows = [row for row in rows if row[0] not in reasons]
     if not rows:
-        raise no_predictor_left(omissions)
+        raise NothingEvaluatedError(omissions)
     columns = ["predictor", "repeat", "size", "judged", "fraction", "accuracy"]
     table = pd.DataFrame(rows, columns=columns)
     candidate_set = trajectories[0].candidate_set

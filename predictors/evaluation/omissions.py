@@ -14,10 +14,10 @@ if TYPE_CHECKING:
 
 __all__ = [
     "NO_NUMBER",
+    "NothingEvaluatedError",
     "Omission",
     "dashed",
     "markdown_table",
-    "no_predictor_left",
     "omission_notes",
     "omission_table",
 ]
@@ -59,15 +59,29 @@ def omission_notes(omitted: pd.DataFrame) -> list[str]:
     ]
 
 
-def no_predictor_left(omissions: Sequence[Omission], by: str | None = None) -> ValueError:
-    """The error of an evaluation in which no predictor could be evaluated; a reason that all share is said once."""
+class NothingEvaluatedError(ValueError):
+    """No predictor could be evaluated on some trajectories; a reason that all share is said once.
+
+    Attributes:
+        omissions: Each predictor with its reason.
+    """
+
+    def __init__(self, omissions: Sequence[Omission], by: str | None = None) -> None:
+        super().__init__(_reasons(omissions, by))
+        self.omissions = tuple(omissions)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return NothingEvaluatedError, (self.omissions,)
+
+
+def _reasons(omissions: Sequence[Omission], by: str | None) -> str:
     reasons: dict[str, list[str]] = {}
     for each in omissions:
         reason = f"{by} {each.part!r}: {each.reason}" if by else each.reason
         reasons.setdefault(reason, []).append(each.predictor)
     if len(reasons) == 1:
-        return ValueError(next(iter(reasons)))
-    return ValueError("; ".join(f"{', '.join(dict.fromkeys(names))}: {reason}" for reason, names in reasons.items()))
+        return next(iter(reasons))
+    return "; ".join(f"{', '.join(dict.fromkeys(names))}: {reason}" for reason, names in reasons.items())
 
 
 def dashed(value: object) -> str:

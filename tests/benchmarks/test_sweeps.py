@@ -16,6 +16,7 @@ from click.testing import CliRunner
 from benchmarks.cli.app import main
 from benchmarks.sweeps import Sweep, SweepError, run_sweep
 from benchmarks.sweeps.analysis import for_reading
+from benchmarks.sweeps.run import run_search
 from legible_envs.workspace import make_workspace
 
 KITCHEN = {"workspace": "overcooked", "shape": [5, 5], "prefix": "sum"}
@@ -139,6 +140,29 @@ def test_what_was_not_measured_is_a_dash() -> None:
         [settings | {"workspace": name, "seed": 0, "best": 1.5, "distance": 2.0, "coverage": 0.5} for name in "ab"]
     ).assign(**{"accuracy.bayesian": [0.75, np.nan]})
     assert [row["accuracy.bayesian"] for row in for_reading(table)] == ["0.75", "–"]
+
+
+def test_predictors_that_cannot_be_evaluated_are_named_with_their_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Trajectories of few participants may all have one goal: a fact of the data, and no reason to lose the search."""
+    from legible_envs.overcooked.design.workspace import OvercookedWorkspace
+
+    simulate = OvercookedWorkspace.simulate
+
+    def one_goal(self, genome, num_participants, rng, **settings):
+        trajectories = simulate(self, genome, num_participants, rng, **settings)
+        return [each for each in trajectories if each.goal == trajectories[0].goal]
+
+    monkeypatch.setattr(OvercookedWorkspace, "simulate", one_goal)
+    trial = next(Sweep.from_dict(SMALL | {"emitters": "random", "seeds": 1}).variants()).trial
+    for predictors, missing in ((["shortest-distance", "grid-logistic"], ["grid-logistic"]), (["grid-logistic"],) * 2):
+        row = run_search({**trial, "predictors": predictors, "people": {"participants": 3}})
+        assert row["best"] is not None
+        assert [name for name in predictors if row[f"accuracy.{name}"] is None] == missing
+        assert all("goal" in row[f"omitted.{name}"] for name in missing)
+    labels = {"workspace": "a", "objective": "b", "emitter": "c", "evaluations": 1}
+    rows = pd.DataFrame([labels | {"seed": seed} | row for seed in (0, 1)])
+    rows.loc[1, "accuracy.grid-logistic"] = 0.5
+    assert for_reading(rows)[0]["accuracy.grid-logistic"] == "0.5 (1 of 2 seeds)"
 
 
 def test_workspaces_may_have_predictors_of_their_own() -> None:
