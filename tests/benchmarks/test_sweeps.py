@@ -158,7 +158,7 @@ def test_predictors_that_cannot_be_evaluated_are_named_with_their_reason(monkeyp
         row = run_search({**trial, "predictors": predictors, "people": {"participants": 3}})
         assert row["best"] is not None
         assert [name for name in predictors if row[f"accuracy.{name}"] is None] == missing
-        assert all("goal" in row[f"omitted.{name}"] for name in missing)
+        assert all("nothing to tell apart" in row[f"omitted.{name}"] for name in missing)
     labels = {"workspace": "a", "objective": "b", "emitter": "c", "evaluations": 1}
     rows = pd.DataFrame([labels | {"seed": seed} | row for seed in (0, 1)])
     rows.loc[1, "accuracy.grid-logistic"] = 0.5
