@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 from legible_envs.errors import TaskError
 from legible_envs.support.text import clean_text, dump_yaml, read_text
 from legible_envs.support.validation import entries, integer, shown
-from legible_envs.task_states import StateSpace, SubtaskClass
+from legible_envs.task_states import MAX_SUBTASKS, StateSpace, SubtaskClass
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -110,7 +110,8 @@ class TaskGraph:
         max_open: How many groups may be in progress at once (``pots=1`` is ``max_open=1``); None means no limit.
 
     Raises:
-        TaskError: Duplicate or unknown names, a cycle (named), overlapping groups, or no valid sequence at all.
+        TaskError: Duplicate or unknown names, a cycle (named), overlapping groups, no valid sequence at all, or more
+            than 128 subtasks, 131,072 ways to have done some of them, or a million steps between task states.
 
     Example:
         >>> task = TaskGraph([Subtask("first", ("red",)), Subtask("second", ("blue",), after=("first",))], start="home")
@@ -131,6 +132,10 @@ class TaskGraph:
         max_open: int | None = None,
     ) -> None:
         listed = entries(subtasks)
+        if len(listed) > MAX_SUBTASKS:
+            raise TaskError(
+                f"a task has at most {MAX_SUBTASKS} subtasks, got {len(listed):,}; `count` repeats one of them"
+            )
         for number, subtask in enumerate(listed, 1):
             if not isinstance(subtask, Subtask):
                 raise TaskError(f"entry {number} of `subtasks` must be a Subtask, got {shown(subtask)}")

@@ -22,6 +22,7 @@ from benchmarks.cli.options import (
 from benchmarks.cli.program import STOPPED, Commands, Program
 from benchmarks.cli.reproduce import reproduce
 from benchmarks.cli.sweep import sweep
+from benchmarks.console import tell
 from legible_envs import __version__
 
 __all__ = ["main"]
@@ -151,7 +152,7 @@ def report(run: Path) -> None:
     from benchmarks.cli.optimize import write_pictures
 
     check_folder(run)
-    click.echo(f"report: {click.format_filename(write_pictures(run)['report'])}")
+    tell(f"report: {click.format_filename(write_pictures(run)['report'])}")
 
 
 @main.command()
@@ -230,7 +231,7 @@ def score(
         check_folder(folder, "--out")
     recorded = None if trajectories is None else trajectories_in(design, trajectories)
     for line in score_lines(design):
-        click.echo(line)
+        tell(line)
     if recorded is None:
         return
     from benchmarks.console import say
@@ -243,7 +244,7 @@ def score(
     results = evaluate_trajectories(recorded, predictors, groups="participant" if by_participant else None, **settings)
     print_evaluation(say(), results)
     for line in save_evaluation(results, layout, out):
-        click.echo(line)
+        tell(line)
 
 
 @main.command()
@@ -286,9 +287,9 @@ def play(layout: str, fps: int, record: Path | None) -> None:
 
     kitchen = load_kitchen(layout)
     played = play_layout(kitchen.layout, recipes=kitchen.soups, fps=fps, record=record)
-    click.echo(f"{plural(len(played.actions), 'step')}, reward {played.rewards.sum():g}")
+    tell(f"{plural(len(played.actions), 'step')}, reward {played.rewards.sum():g}")
     if record is not None and len(played.actions):
-        click.echo(f"recorded: {click.format_filename(record)}")
+        tell(f"recorded: {click.format_filename(record)}")
     if played.interrupted:
         raise click.exceptions.Exit(STOPPED)
 
@@ -312,7 +313,7 @@ def fetch(source: Path | None, out: Path | None) -> None:
     """
     from legible_envs.datasets.overcooked_2019 import fetch_recordings
 
-    click.echo(f"recordings: {fetch_recordings(out, source=source)}")
+    tell(f"recordings: {fetch_recordings(out, source=source)}")
 
 
 @humans.command()

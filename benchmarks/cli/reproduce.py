@@ -13,6 +13,7 @@ import click
 from benchmarks.cli.destinations import check_folder
 from benchmarks.cli.options import out_folder, scheduler_option, workers_option
 from benchmarks.cli.program import STOPPED
+from benchmarks.console import tell
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -147,12 +148,12 @@ def reproduce(
                 progress=progress,
             )
     except KeyboardInterrupt:
-        click.echo(f"stopped; finished trials are kept in {folder}; the same command continues from there", err=True)
+        tell(f"stopped; finished trials are kept in {folder}; the same command continues from there", err=True)
         raise click.exceptions.Exit(STOPPED) from None
     except TrialsFailed as error:
         raise click.ClickException(str(error)) from error
     _tell(folder)
-    click.echo(f"report {report}")
+    tell(f"report {report}")
 
 
 def _tell(folder: Path) -> None:
@@ -160,4 +161,4 @@ def _tell(folder: Path) -> None:
     for kind in ("tables", "figures"):
         found = sorted(path.name for path in (folder / kind).glob("*") if path.is_file())
         if found:
-            click.echo(f"{kind} {folder / kind}: {', '.join(found)}")
+            tell(f"{kind} {folder / kind}: {', '.join(found)}")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 import numpy.typing as npt
 
+from legible_envs.support.names import printable
 from legible_envs.support.validation import integer, real
 
 if TYPE_CHECKING:
@@ -148,5 +149,5 @@ def draw_reaches(
     for mean, goal in zip(gaussian.means_, gaussian.goals_, strict=True):
         points = pixels(mean[:, :2])
         pen.line(points, fill=colours[goal], width=3)
-        pen.text(points[-1], str(goal), fill=(20, 20, 20))
+        pen.text(points[-1], printable(str(goal)), fill=(20, 20, 20))
     return np.asarray(image)
