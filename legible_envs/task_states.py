@@ -254,7 +254,7 @@ class StateSpace:
         return dict(weights)
 
     def _odds(self, done: tuple[int, ...]) -> tuple[tuple[str, ...], list[tuple[int, str, float, State]]]:
-        """Valid goals where so much is done, and ``(class, goal, probability, next state)`` of every step from there."""
+        """Valid goals where so much is done, and ``(class, goal, probability, next state)`` of every step."""
         completions, standing = self.completions, self._standings[done]
         total, steps = completions[done], []
         for i, then in zip(standing.ready, standing.following, strict=True):

@@ -99,7 +99,7 @@ main.add_command(reproduce)
 @click.option("--emitter-option", "emitter_options", multiple=True, type=Assignment(), metavar="NAME=VALUE",
               help="An option of the emitter, such as sigma=0.5; repeatable.")  # fmt: skip
 @click.option("--evaluations", type=click.IntRange(min=1), help="Layouts to score. [default: 200000]")
-@click.option("--iterations", nargs=2, type=click.IntRange(0, 10_000_000), metavar="RANDOM CLIMBS",
+@click.option("--iterations", nargs=2, type=click.IntRange(0, 1_000_000), metavar="RANDOM CLIMBS",
               help="The paper's budget instead: random layouts, then climbs, each to its end.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 @click.option(
@@ -184,8 +184,8 @@ def workspaces() -> None:
               help="Evaluate this predictor by cross-validation; repeatable.")  # fmt: skip
 @click.option("--cut", type=click.Choice(["steps", "cells", "time", "arc"]), default="steps", show_default=True,
               help="The quantity that fractions observed refer to.")  # fmt: skip
-@click.option("--folds", type=click.IntRange(min=2), default=4, show_default=True, help="Of the cross-validation.")
-@click.option("--repeats", type=click.IntRange(min=1), default=3, show_default=True, help="Of the cross-validation.")
+@click.option("--folds", type=click.IntRange(2, 1_000), default=4, show_default=True, help="Of the cross-validation.")
+@click.option("--repeats", type=click.IntRange(1, 1_000), default=3, show_default=True, help="Of the cross-validation.")
 @click.option("--by-participant", is_flag=True, help="Evaluate on participants whom it did not learn from.")
 @click.option("--keep-rare", is_flag=True, help="Keep goals with fewer examples than folds.")
 @click.option("--curve/--no-curve", default=True, show_default=True, help="Draw a learning curve.")

@@ -23,7 +23,7 @@ __all__ = ["evaluate", "evaluate_predictors"]
               help="A file of real pointing (.csv.gz): evaluate predictors of reaches on it too.")  # fmt: skip
 @click.option("--neural/--no-neural", default=None, help="Evaluate networks too. [default: where torch is installed]")
 @click.option("--layout", "layouts", multiple=True, metavar="NAME", help="Only this kitchen; repeatable.")
-@click.option("--repeats", type=click.IntRange(min=1), default=3, show_default=True, help="Of the cross-validation.")
+@click.option("--repeats", type=click.IntRange(1, 1_000), default=3, show_default=True, help="Of the cross-validation.")
 @click.option("--out", type=DestinationFolder(), help="Folder to write tables to.")
 def evaluate(
     folder: Path | None,

@@ -17,6 +17,7 @@ from benchmarks.cli.program import STOPPED
 from benchmarks.console import number, plural, tell
 from benchmarks.presenters.base import Part, Presenter, summary_of
 from benchmarks.presenters.registry import presenter_of, presenter_of_run, usable_presenters
+from legible_envs.support.names import file_name
 from legible_envs.workspace import workspace_class
 from optimizers.errors import SearchError
 from optimizers.runs.folder import RunFolder, is_run_folder
@@ -40,8 +41,10 @@ def default_folder(domain: str, settings: Mapping[str, Any]) -> Path:
     """The folder of a search that names none."""
     name = re.sub(r"[^\w-]+", "-", domain)
     if settings.get("start_from"):
-        return Path("runs") / f"{name}-from-{Path(settings['start_from']).stem}-seed{settings['seed']}"
-    return Path("runs") / f"{name}-{presenter_of(domain).folder_name(settings)}-seed{settings['seed']}"
+        about = f"from-{Path(settings['start_from']).stem}"
+    else:
+        about = presenter_of(domain).folder_name(settings)
+    return Path("runs") / file_name(f"{name}-{about}-seed{settings['seed']}")
 
 
 def check_options(domain: str, given: Collection[str]) -> None:

@@ -113,7 +113,7 @@ def _run_part(module: str, folder: Path, how: Mapping[str, Any]) -> list[Section
 @click.command()
 @click.argument("experiment", type=click.Choice(list(EXPERIMENTS)))
 @click.option("--quick", is_flag=True, help="A version of two minutes.")
-@click.option("--seeds", type=click.IntRange(min=1), help="Seeds, in place of the experiment's own number.")
+@click.option("--seeds", type=click.IntRange(1, 10_000), help="Seeds, in place of the experiment's own number.")
 @out_folder
 @workers_option
 @scheduler_option

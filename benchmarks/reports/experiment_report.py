@@ -14,6 +14,7 @@ from benchmarks.reports.numbers import with_minus
 from benchmarks.reports.pages import page_environment, table_of
 from legible_envs import __version__
 from legible_envs.support.files import write_text
+from legible_envs.support.names import printable
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -69,6 +70,7 @@ def _with_code(text: str) -> Any:
     """Words for the page, where what stands between backticks is set as code."""
     from markupsafe import Markup, escape
 
+    text = printable(text, lines=True)
     parts = text.split("`")
     if len(parts) % 2 == 0:
         return escape(with_minus(text))

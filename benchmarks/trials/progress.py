@@ -63,7 +63,9 @@ class TrialsProgress:
         status = " · ".join(f"{count} {what}" for what, count in counts.items() if count)
         self._bar.update(self._task, total=event.total, completed=event.done + event.failed, status=status)
         workers = sorted(event.running.items())
-        lines = [Text(printable(f"  {worker}: {describe(trial)}"), style="dim") for worker, trial in workers[:_MAX_WORKERS]]
+        lines = [
+            Text(printable(f"  {worker}: {describe(trial)}"), style="dim") for worker, trial in workers[:_MAX_WORKERS]
+        ]
         if len(workers) > _MAX_WORKERS:
             lines.append(Text(f"  … and {len(workers) - _MAX_WORKERS} more workers", style="dim"))
         self._live.update(Group(self._bar, *lines))

@@ -136,8 +136,8 @@ def spreadsheet_text(text: str) -> str:
     """A text as it stands in a CSV, so that no spreadsheet takes it for a formula and runs it.
 
     What begins like a formula (``=``, ``+``, ``-``, ``@``, their wide forms, a tab or the end of a line, also behind
-    blanks) has an apostrophe in front, the mark of text in spreadsheets. Numbers such as ``-0.5`` stay, and a lone sign.
-    :func:`text_of_spreadsheet` gives every text back.
+    blanks) has an apostrophe in front, the mark of text in spreadsheets. Numbers such as ``-0.5`` stay as they are, and
+    a lone sign. :func:`text_of_spreadsheet` gives every text back.
 
     Example:
         >>> spreadsheet_text("=1+1"), spreadsheet_text("-1"), spreadsheet_text("'=1+1"), spreadsheet_text("cube")

@@ -15,7 +15,7 @@ from typing import Final
 
 from legible_envs.support.validation import shown
 
-__all__ = ["check_file_name", "file_name", "printable"]
+__all__ = ["check_file_name", "file_name", "is_whole", "printable"]
 
 _UNSEEN: Final = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
 """Categories of Unicode: control, format (direction of writing, no width), half characters, ends of lines."""
@@ -48,6 +48,16 @@ def printable(text: str, *, lines: bool = False) -> str:
     )
 
 
+def is_whole(text: str) -> bool:
+    r"""Whether a text is made of whole characters: halves of surrogate pairs are in no file, terminal or picture.
+
+    Example:
+        >>> is_whole("cup"), is_whole("\ud83c")
+        (True, False)
+    """
+    return not any("\ud800" <= character <= "\udfff" for character in text)
+
+
 def _is_seen(text: str, at: int) -> bool:
     character = text[at]
     if character in _JOINERS:
@@ -71,9 +81,9 @@ _RESERVED: Final = re.compile(r"(?:CON|PRN|AUX|NUL|CONIN\$|CONOUT\$|(?:COM|LPT)[
 
 
 def file_name(text: str) -> str:
-    """A name for one file or folder, on every system, that resembles a text; most texts are such a name as they are.
+    r"""A name for one file or folder, on every system, that resembles a text; most texts are such a name as they are.
 
-    No path, no ``..``, no leading dot, no blanks or dots at the end, none of ``/ \\ : * ? " < > |``, nothing that
+    No path, no ``..``, no leading dot, no blanks or dots at the end, none of ``/ \ : * ? " < > |``, nothing that
     :func:`printable` escapes, none of the names that Windows keeps for devices, at most 200 bytes. Different texts may
     have the same name, unless they were cut.
 

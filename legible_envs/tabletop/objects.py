@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.errors import LayoutError
+from legible_envs.support.names import is_whole
 from legible_envs.support.validation import entries, flag, is_real, real, shown
 
 __all__ = ["CUBE", "OBSTACLE_SIZE", "Table", "TableObject", "VirtualObstacle", "rectangle", "rectangles_overlap"]
@@ -91,7 +92,7 @@ def rectangles_overlap(a: npt.NDArray[np.float64], b: npt.NDArray[np.float64]) -
 
 def check_encodable(what: str, name: str) -> None:
     """Refuse half of a character (a lone surrogate), which no file and no terminal can hold."""
-    if any("\ud800" <= character <= "\udfff" for character in name):
+    if not is_whole(name):
         raise LayoutError(f"{what} holds half of a surrogate pair, which no text can: {name!r}", rule="name")
 
 
