@@ -37,7 +37,7 @@ __all__ = ["OvercookedVectorEnv"]
 
 MOST_GAMES: Final = 65_536
 """Games of one vector environment."""
-MOST_BYTES: Final = 2**34
+MOST_BYTES: Final = 2**32
 """Of the arrays of all games."""
 _MARKS: Final = tuple(
     f"_{key}" for key in ("goal_mask", "action_mask", "layout_id", "num_done", "deliveries", "crossings")
@@ -106,14 +106,14 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
         self.max_episode_steps = read_step_limit(max_episode_steps)
         self.single_action_space = spaces.Discrete(NUM_ACTIONS)
         self.single_observation_space = self.settings.observation_space()
+        packed = self.settings.pack(self.settings.preview())
+        _check_memory(self.num_envs, packed, self.single_observation_space)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self._rngs: list[np.random.Generator | None] = [None] * self.num_envs
         self._seeds = [-1] * self.num_envs
         self._ended = 0
         self._begun = False
-        packed = self.settings.pack(self.settings.preview())
-        _check_memory(self.num_envs, packed, self.single_observation_space)
         self._allocate(packed)
 
     def _allocate(self, packed: PackedKitchen) -> None:
