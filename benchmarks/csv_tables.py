@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -29,7 +30,11 @@ def write_tables(folder: Path, tables: Iterable[tuple[str, pd.DataFrame]]) -> li
 
 def csv_of(table: pd.DataFrame) -> str:
     """A table as CSV; a text or heading that spreadsheets would run as a formula has an apostrophe in front."""
-    return str(_each_text(table, spreadsheet_text).to_csv(index=False))
+    written = _each_text(table, spreadsheet_text)
+    texts = [value for at, kind in enumerate(table.dtypes) if kind.kind == "O" for value in table.iloc[:, at]]
+    has_returns = any(isinstance(text, str) and "\r" in text for text in (*texts, *table.columns))
+    # pandas leaves a carriage return unquoted, which readers take for the end of a line
+    return str(written.to_csv(index=False, quoting=csv.QUOTE_NONNUMERIC if has_returns else csv.QUOTE_MINIMAL))
 
 
 def as_written(table: pd.DataFrame) -> pd.DataFrame:

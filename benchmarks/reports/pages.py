@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from benchmarks.reports.numbers import fixed, p_value, scale_of, significant, with_minus
-
 from legible_envs.support.names import printable
 
 if TYPE_CHECKING:

@@ -21,7 +21,7 @@ from legible_envs.workspace import make_workspace
 from optimizers import search
 
 ROOT = Path(__file__).parents[2]
-BOUND = r"(?i)at most|from .* to |<= |in the range|larger than|smaller than|cannot be greater"
+BOUND = r"(?i)at most|within 1000 m|from .* to |<= |in the range|larger than|smaller than|folds need at least"
 
 
 @pytest.mark.slow
