@@ -24,7 +24,7 @@ def check_participants(n: object, executions: object) -> tuple[int, int]:
     executions = integer("executions", executions, 0, MOST_TASKS, unit="tasks")
     if n * executions > MOST_TASKS:
         raise ValueError(
-            f"{n:,} participants who do the task {executions:,} times each do {n * executions:,} tasks; expected at most "
-            f"{MOST_TASKS:,} in one call"
+            f"{n:,} participants who do the task {executions:,} times each do {n * executions:,} tasks; expected at "
+            f"most {MOST_TASKS:,} in one call"
         )
     return n, executions

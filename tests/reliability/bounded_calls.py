@@ -1,6 +1,7 @@
 """Every public count, called with an ordinary number and with absurd ones; run in a process of its own.
 
-Prints a line of JSON per call: what was called, with what, how long it took, by how many MiB memory grew, and what came.
+Prints a line of JSON per call: what was called, whether it was refused, how many seconds it took, by how many MiB
+memory grew, and what came.
 """
 
 from __future__ import annotations
