@@ -39,8 +39,8 @@ from tests.support.command_line import legible
 HOSTILE = (
     # markup, and what steers or confuses a terminal
     "[/foo]", "[bold red]x[/]", "[link=http://evil.example]x[/link]", ":smile:", "\x1b[2J", "\x1b]0;owned\x07",
-    "\x9b31m", "a\rb", "a\nb", "a\tb", "\x00", "\x7f", "\u202egnp.exe", "\u2066x\u2069", "\u200fx", "a\u200bb", "a\ufeffb",
-    "a\u2028b", "a\x85b", "\ufffe",
+    "\x9b31m", "a\rb", "a\nb", "a\tb", "\x00", "\x7f", "\u202egnp.exe", "\u2066x\u2069", "\u200fx", "a\u200bb",
+    "a\ufeffb", "a\u2028b", "a\x85b", "\ufffe",
     # formulas, also hidden ones
     "=1+1", "+cmd|' /C calc'!A0", "-2+3", "@SUM(1)", "\t=1", "'=1", "＝1", " =1",
     # HTML, SVG, scripts, templates, mathtext, Markdown
