@@ -89,7 +89,7 @@ class Program(Commands):
 def _show(error: click.ClickException) -> None:
     """Print an error as click does, but for what in its message would steer the terminal: messages quote names."""
     shown = _shortened(error)
-    shown.message = printable(shown.message, lines=True)
+    vars(shown)["message"] = printable(shown.message, lines=True)  # click strips escapes, which would hide them
     stream = io.StringIO()
     shown.show(stream)
     tell(stream.getvalue().removesuffix("\n"), err=True)
