@@ -172,7 +172,7 @@ task_option = click.option(
     "--task", metavar="NAME|FILE.yaml", help="Tables: what is built. [default: the one that fits]"
 )
 workers_option = click.option(
-    "--workers", type=click.IntRange(min=1), help="Processes on this machine. [default: all cores]"
+    "--workers", type=click.IntRange(1, 1_024), help="Processes on this machine. [default: all cores]"
 )
 scheduler_option = click.option(
     "--scheduler", type=SchedulerAddress(), metavar="ADDRESS", help="Run on a Dask cluster, e.g. tcp://10.0.0.1:8786."

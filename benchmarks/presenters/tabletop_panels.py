@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from legible_envs.support.names import check_file_name
 from optimizers.errors import SearchError
 
 if TYPE_CHECKING:
@@ -96,7 +97,11 @@ def listed(folder: Path) -> dict[str, str]:
         raise SearchError(f"{folder / LIST} is not valid JSON: {error}") from error
     if not isinstance(data, dict) or not set(data) <= set(CONDITIONS):
         raise SearchError(f"{folder / LIST} must map conditions {list(CONDITIONS)} to folders")
-    return {str(key): str(value) for key, value in data.items()}
+    folders = {key: str(value) for key, value in data.items()}
+    for key, name in folders.items():  # the file may come from a stranger, and searches write there
+        if name != ".":
+            check_file_name(f"the folder of `{key}` in {folder / LIST}", name, error=SearchError)
+    return folders
 
 
 def beta_of(workspace: Any) -> float:

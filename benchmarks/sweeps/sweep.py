@@ -16,6 +16,7 @@ from typing import Any, Final, NamedTuple, get_args
 
 import numpy as np
 
+from legible_envs.support.names import check_file_name, file_name
 from legible_envs.support.text import read_text
 from legible_envs.support.validation import choice, integer, shown
 from legible_envs.workspace import ObjectiveName, Workspace, make_workspace
@@ -100,7 +101,7 @@ class Sweep:
         except ValueError as error:
             raise SweepError(f"{path} is not TOML: {error}") from error
         try:
-            return cls.from_dict({"name": path.stem} | data)
+            return cls.from_dict({"name": file_name(path.stem)} | data)
         except SweepError as error:
             raise SweepError(f"{path}: {error}") from error
 
@@ -240,9 +241,7 @@ def _prediction(data: Mapping[str, Any], whose: str = "") -> Prediction:
 
 def _name(value: Any) -> str:
     """The name of a sweep, which names its folder, too."""
-    if not isinstance(value, str) or not value.strip() or value.strip(". ") == "" or set(value) & set("/\\:\0\n"):
-        raise SweepError(f"`name` must be a text without / \\ : or line breaks, got {shown(value)}")
-    return value
+    return check_file_name("name", value, error=SweepError)
 
 
 def _seeds(value: Any) -> tuple[int, ...]:
