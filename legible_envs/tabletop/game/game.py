@@ -190,10 +190,10 @@ class TableGame:
         if self.holding >= 0 or contact == "never" or (contact == "slow" and speed > self.rules.slow_speed):
             self.is_low = False
         elif not self.is_low:
-            self.is_low = self._nearest >= self._radius - TOUCH
+            self.is_low = self._nearest() >= self._radius - TOUCH
 
     def _push(self, before: tuple[float, float], moved: float) -> None:
-        is_near = self.is_low and self._nearest <= self._radius + moved + 1e-3
+        is_near = self.is_low and self._nearest() <= self._radius + moved + 1e-3
         if is_near or not self.physics.is_resting:
             self.is_low = self.physics.advance(before, self.velocity, self.is_low)
         else:
@@ -202,8 +202,11 @@ class TableGame:
     def _look(self) -> None:
         """Measure the distances of the objects to the hand, which rises where it would be in one."""
         touch_distances(self.physics.positions, self.physics.angles, self._half_sizes, *self.hand, self._distances)
-        self._nearest = float(self._distances[self.physics.solid].min(initial=np.inf))
-        self.is_low = self.is_low and self._nearest >= self._radius - TOLERANCE
+        self.is_low = self.is_low and self._nearest() >= self._radius - TOLERANCE
+
+    def _nearest(self) -> float:
+        """Metres from the hand's centre to the nearest object on the table."""
+        return float(self._distances[self.physics.solid].min(initial=np.inf))
 
     def _take_or_place(self) -> int:
         if self.delivery is not None and self.delivery.kind != "goal":
