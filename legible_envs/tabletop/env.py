@@ -61,10 +61,16 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
       now (the nearest, if several) takes it. It never takes an object that is not valid.
     - *Push*: an empty, slow hand pushes the objects it runs into and cannot take (`pymunk`: dry friction with the
       table, collisions among objects, a rim round the table). `contact="always"` keeps the hand down at every speed,
-      `"never"` keeps it up. A hand that carries an object is always up.
+      `"never"` keeps it up. A hand that carries an object is always up. Placed objects are solid. A hand that runs into
+      an object that cannot give way (placed, fixed, or held fast by the rim or by others) is not stopped: it rises,
+      passes over it, and comes down beyond.
     - *Carry* and *place*: a held object moves with the hand. A slow hand at most `release_distance` from the place of
-      the object it holds puts it exactly there, for good. This place is the one in the task's configuration; for an object
-      without, any point of the assembly zone with room (in the task `bins`: the next goal that is touched).
+      the object it holds puts it exactly there, for good; what lies there is pushed aside. This place is the one in the
+      task's configuration; for an object without, any point of the assembly zone with room (in the task `bins`: the
+      next goal that is touched).
+
+    At the end of every step all of each object that lies on the table is on it, and none that can be moved overlaps
+    with another by 1 mm or more, at any speed of the hand (what lies in a bin lies in it).
 
     **Virtual obstacles** are projected for the person alone: objects and the robot do not feel them. `"hard"` ones stop
     the hand at their outline grown by the hand's half-width, which shortest paths keep clear of too; `"soft"` ones can
@@ -176,7 +182,8 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
         layout: The arrangement: a `TabletopLayout`, JSON text or a path, a mapping, or a genome with `max_obstacles`
             obstacles.
         virtual_obstacles: `"hard"`: they stop the hand; `"soft"`: they can be crossed, and crossings are counted.
-        contact: When the hand pushes: `"slow"`, `"always"` or `"never"`.
+        contact: When the hand pushes: `"slow"`, `"always"` or `"never"`. A step in which a fast hand pushes costs more,
+            up to some milliseconds.
         max_obstacles: Most obstacles a layout has.
         max_speed: Of the hand, m/s. The default lets people's fastest reaches pass; 0.5 is easier to explore and learn.
         slow_speed: Up to which the hand takes, places and pushes, m/s.

@@ -33,6 +33,7 @@ __all__ = [
 ]
 
 HAND_SPEED: Final = 0.5
+_LONG: Final = 1e6
 """How fast a key moves the hand, m/s: too fast to take an object, so that players take by letting go."""
 
 _SETS: Final = (
@@ -94,7 +95,7 @@ def layout_entries(value: object) -> list[Any] | None:
 
 
 def read_action(action: npt.ArrayLike) -> tuple[float, float]:
-    """An action as two numbers.
+    """An action as two numbers; huge ones are scaled down, to a vector still far longer than 1.
 
     Args:
         action: ``(2,)`` finite numbers.
@@ -114,6 +115,9 @@ def read_action(action: npt.ArrayLike) -> tuple[float, float]:
             raise ValueError
     except (TypeError, ValueError, OverflowError):
         raise ValueError(f"expected an action of two finite numbers, got {shown(action)}") from None
+    longest = max(abs(x), abs(y))
+    if longest > _LONG:  # shortened later all the same; its length times a speed must not overflow
+        x, y = x / longest * _LONG, y / longest * _LONG
     return x, y
 
 

@@ -9,6 +9,7 @@ from typing import Final, Literal
 import numpy as np
 import numpy.typing as npt
 
+from legible_envs.tabletop.game.contact_kernels import TOLERANCE, TOUCH
 from legible_envs.tabletop.game.physics import TablePhysics
 from legible_envs.tabletop.game.progress import Delivery, TaskProgress
 from legible_envs.tabletop.game.reach_log import ReachLog
@@ -28,6 +29,7 @@ CONTACTS: Final = ("slow", "always", "never")
 
 FREE, HAND, ROBOT, PLACED = range(4)
 _NO_BOXES: Final = np.empty((0, 6))
+_EDGE: Final = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,19 +190,23 @@ class TableGame:
         if self.holding >= 0 or contact == "never" or (contact == "slow" and speed > self.rules.slow_speed):
             self.is_low = False
         elif not self.is_low:
-            self.is_low = bool(self._distances[self._on_table].min(initial=np.inf) >= self._radius - 1e-4)
+            self.is_low = self._nearest() >= self._radius - TOUCH
 
     def _push(self, before: tuple[float, float], moved: float) -> None:
-        is_near = self.is_low and self._distances[self._on_table].min(initial=np.inf) <= self._radius + moved + 1e-3
+        is_near = self.is_low and self._nearest() <= self._radius + moved + 1e-3
         if is_near or not self.physics.is_resting:
-            self.physics.advance(before, self.velocity, self.is_low)
+            self.is_low = self.physics.advance(before, self.velocity, self.is_low)
         else:
             self.physics.settle()
 
     def _look(self) -> None:
-        """Measure the distances of the objects to the hand."""
+        """Measure the distances of the objects to the hand, which rises where it would be in one."""
         touch_distances(self.physics.positions, self.physics.angles, self._half_sizes, *self.hand, self._distances)
-        self._on_table = self.status == FREE
+        self.is_low = self.is_low and self._nearest() >= self._radius - TOLERANCE
+
+    def _nearest(self) -> float:
+        """Metres from the hand's centre to the nearest object on the table."""
+        return float(self._distances[self.physics.solid].min(initial=np.inf))
 
     def _take_or_place(self) -> int:
         if self.delivery is not None and self.delivery.kind != "goal":
@@ -248,19 +254,22 @@ class TableGame:
             at, angle = self.hand, float(self.physics.angles[i])
             if not self._has_room(i, at, angle):
                 return 0
-        self.physics.put(i, at, angle, is_fixed=True)
+        if not self.physics.put(i, at, angle, is_fixed=True):
+            return 0
         self.status[i] = PLACED
         self.holding, self.delivery = -1, None
         self._finish(delivery)
         return 1
 
     def _has_room(self, i: int, at: tuple[float, float], angle: float) -> bool:
-        """Whether an object may be put down at a point of the assembly zone, beside those placed before."""
+        """Whether an object may be put down at a point of the assembly zone, beside those that are fixed."""
         x0, y0, x1, y1 = self.layout.table.assembly
         if not (x0 <= at[0] <= x1 and y0 <= at[1] <= y1):
             return False
         objects, there = self.layout.objects, rectangle(*at, angle, *self.layout.objects[i].size)
-        for j in np.flatnonzero(self.status == PLACED):
+        if (there < -_EDGE).any() or (there > np.array(self._size) + _EDGE).any():
+            return False
+        for j in np.flatnonzero(self.physics.solid & ~self.physics.loose):
             x, y = self.positions[j].tolist()
             if rectangles_overlap(there, rectangle(x, y, float(self.physics.angles[j]), *objects[j].size)):
                 return False
@@ -290,6 +299,8 @@ class TableGame:
     def robot_put(self, at: tuple[float, float], near: float) -> int:
         """Open the gripper at a point: the object stays in its place if that is near, else it lies free again.
 
+        The gripper stays closed where the whole table has no room for the object.
+
         Returns:
             How many subtasks this finished.
         """
@@ -297,13 +308,14 @@ class TableGame:
         if delivery is None:
             return 0
         assert delivery.at is not None
-        self._robot_delivery = None
         is_there = math.dist(at, delivery.at) <= near
+        there = (delivery.at, self.task.layout.objects[i].angle) if is_there else (at, float(self.physics.angles[i]))
+        if not self.physics.put(i, *there, is_fixed=is_there):
+            return 0
+        self._robot_delivery = None
         if is_there:
-            self.physics.put(i, delivery.at, self.task.layout.objects[i].angle, is_fixed=True)
             self.progress.finish(delivery)
         else:
-            self.physics.put(i, at, float(self.physics.angles[i]), is_fixed=False)
             self.progress.give_up(delivery)
         self.status[i] = PLACED if is_there else FREE
         self._look()
