@@ -33,8 +33,9 @@ __all__ = [
 ]
 
 HAND_SPEED: Final = 0.5
-_LONG: Final = 1e6
 """How fast a key moves the hand, m/s: too fast to take an object, so that players take by letting go."""
+
+_LONG: Final = 1e6
 
 _SETS: Final = (
     {(0, 1): 1073741906, (0, -1): 1073741905, (1, 0): 1073741903, (-1, 0): 1073741904},  # arrows
