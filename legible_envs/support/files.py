@@ -13,7 +13,7 @@ import numpy as np
 
 from legible_envs.support.file_kinds import describe_file, is_zip
 
-__all__ = ["open_npz", "remove_leftovers", "write_atomically", "write_npz", "write_text"]
+__all__ = ["is_leftover", "open_npz", "remove_leftovers", "write_atomically", "write_npz", "write_text"]
 
 _MARK = ".part-"
 
@@ -88,9 +88,14 @@ def open_npz(path: str | os.PathLike[str]) -> Iterator[Mapping[str, Any]]:
         raise
 
 
+def is_leftover(path: Path) -> bool:
+    """Whether a file is, by its name, a temporary one of a process that was killed while it wrote."""
+    return path.name.startswith(".") and _MARK in path.name
+
+
 def remove_leftovers(folder: Path) -> None:
     """Remove temporary files that a killed process left in a folder."""
-    for leftover in folder.glob(f".*{_MARK}*"):
+    for leftover in filter(is_leftover, folder.glob(".*")):
         with contextlib.suppress(OSError):
             leftover.unlink()
 

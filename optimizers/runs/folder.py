@@ -9,6 +9,12 @@
 =============== ======================================================================================================
 
 Every file is replaced in one step, so a run that is killed leaves whole files; ``metrics.csv`` alone is appended to.
+The manifest is the first file that is written, and what makes a folder the folder of a run: whenever a search is
+killed, its folder holds no run, one that has only begun (a manifest and no checkpoint), or one that can be continued.
+The first file that an overwritten run loses is its manifest, so that it is there whole or not at all.
+
+The manifest carries its own digest; that of a finished run also names those of archive and metrics
+(:mod:`legible_envs.support.digests`).
 """
 
 from __future__ import annotations
@@ -16,6 +22,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import os
 import platform
 import subprocess
 import sys
@@ -25,8 +32,9 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from legible_envs.support.files import remove_leftovers, write_text
-from optimizers.errors import SearchError
+from legible_envs.support.files import is_leftover, remove_leftovers, write_text
+from optimizers.errors import CheckpointError, SearchError
+from optimizers.runs.checkpoint import CheckpointFolder
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -71,11 +79,29 @@ class RunFolder:
         self._metrics = path / "metrics.csv"
         self._best = path / "best.txt"
         self._best_json = path / "best.json"
+        self._replaced = path / ".config.json.replaced"
 
     @property
     def holds_a_run(self) -> bool:
-        """Whether something of a run lies there."""
-        return self._config.exists() or self.archive.exists() or any(self.checkpoints.glob("*.checkpoint"))
+        """Whether something of a run lies there; what is left of one that was being overwritten does not count."""
+        if self._config.exists():
+            return True
+        return not self._replaced.exists() and (self.archive.exists() or self._has_checkpoints)
+
+    @property
+    def has_only_begun(self) -> bool:
+        """Whether the search there was stopped before its first checkpoint: nothing is known but its settings."""
+        return self._config.exists() and not self.archive.exists() and not self._has_checkpoints
+
+    def others(self) -> list[str]:
+        """Names of what lies there and is no run, nor what is left of one that was killed or being overwritten."""
+        if self.holds_a_run or self._replaced.exists() or not self.path.is_dir():
+            return []
+        return sorted(file.name for file in self.path.iterdir() if not is_leftover(file) and file != self.checkpoints)
+
+    @property
+    def _has_checkpoints(self) -> bool:
+        return any(self.checkpoints.glob("*.checkpoint"))
 
     def create(self, *, overwrite: bool) -> None:
         """Make the folder ready for a new run.
@@ -83,17 +109,48 @@ class RunFolder:
         Raises:
             SearchError: It holds a run already and ``overwrite`` is False.
         """
-        if self.holds_a_run:
-            if not overwrite:
-                raise SearchError(
-                    f"{self.path} already holds a run: continue it with resume=True, choose another folder, or pass "
-                    "overwrite=True to replace it"
-                )
-            best = (self._best, self._best_json)
-            for file in (self._config, self._metrics, self.archive, *best, *self.checkpoints.glob("*.checkpoint")):
-                file.unlink(missing_ok=True)
+        if self.holds_a_run and not overwrite:
+            raise SearchError(
+                f"{self.path} already holds a run: continue it with resume=True, choose another folder, or pass "
+                "overwrite=True to replace it"
+            )
+        self._discard()
         self.path.mkdir(parents=True, exist_ok=True)
         remove_leftovers(self.path)
+
+    def _discard(self) -> None:
+        """Remove the run that lies there, or what is left of one whose removal was interrupted.
+
+        The manifest gets another name first, in one step: before it the run is whole, from then on it is none.
+        """
+        if not (self.holds_a_run or self._replaced.exists()):
+            return
+        if self._config.exists():
+            os.replace(self._config, self._replaced)
+        elif not self._replaced.exists():
+            write_text(self._replaced, "")
+        for file in (self._metrics, self.archive, self._best, self._best_json, *self.checkpoints.glob("*.checkpoint")):
+            file.unlink(missing_ok=True)
+        self._replaced.unlink(missing_ok=True)
+
+    def settings(self) -> dict[str, Any]:
+        """Settings of the search that lies there: of its manifest, or of its newest checkpoint where that is lost.
+
+        Keys are those of the manifest: ``workspace``, ``objective``, ``emitter``, ``seed``, ...
+
+        Raises:
+            SearchError: Neither can be read.
+        """
+        try:
+            return self.read_config()
+        except SearchError as error:
+            try:
+                found = CheckpointFolder(self.checkpoints, {}).settings()
+            except CheckpointError:
+                found = None
+            if found is None:
+                raise error from None
+            return found
 
     def read_config(self) -> dict[str, Any]:
         """The manifest.
