@@ -35,7 +35,9 @@ def missing_recordings() -> str:
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """The option of tests/reliability."""
-    parser.addoption("--thorough", action="store_true", help="try what tests/reliability tries a hundred times as often")
+    parser.addoption(
+        "--thorough", action="store_true", help="try what tests/reliability tries a hundred times as often"
+    )
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:

@@ -1,0 +1,172 @@
+"""Typed models of what files hold, and their refusals in the words of :mod:`legible_envs.support.validation`.
+
+A model says once which keys a file has, of which type and in which range; pydantic checks the file against it::
+
+    class Entry(FileModel):
+        name: Annotated[str, Text()]
+        count: Annotated[int, Whole(1, 1000)] = 1
+
+    class Content(FileModel):
+        entries: Annotated[list[Entry], Length(1, 64)]
+
+    validated(Content, {"entries": [{"name": "dish", "count": 0}]}, "the list")
+    # ValueError: the list: `entries[0].count` must be an integer from 1 to 1000, got 0
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from difflib import get_close_matches
+from typing import Any, Final, TypeVar
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+
+from legible_envs.support.validation import Closed, MakeError, choice, flag, integer, real, shown
+
+__all__ = ["Choice", "FileModel", "Flag", "Length", "Real", "Text", "Whole", "as_path", "validated"]
+
+Model = TypeVar("Model", bound=BaseModel)
+
+_HERE: Final = "`\0`"  # stands for the path of a value until it is known
+
+
+class FileModel(BaseModel):
+    """A mapping with known keys and values of exact types: no number is made of a text, no key ignored."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+def Whole(low: float = -math.inf, high: float = 2**63 - 1) -> BeforeValidator:
+    """A whole number in a range."""
+    return BeforeValidator(lambda value: integer(_HERE, value, low, high))
+
+
+def Real(low: float = -math.inf, high: float = math.inf, closed: Closed = "both") -> BeforeValidator:
+    """A finite number in a range."""
+    return BeforeValidator(lambda value: real(_HERE, value, low, high, closed=closed))
+
+
+def Flag() -> BeforeValidator:
+    """True or False."""
+    return BeforeValidator(lambda value: flag(_HERE, value))
+
+
+def Choice(*options: object) -> BeforeValidator:
+    """One of several values."""
+    return BeforeValidator(lambda value: choice(_HERE, value, options))
+
+
+def Text(most: int = 1000, *, empty: bool = False) -> BeforeValidator:
+    """A text of limited length."""
+
+    def check(value: object) -> str:
+        if not isinstance(value, str) or not (value or empty):
+            raise ValueError(f"{_HERE} must be a {'' if empty else 'non-empty '}text, got {shown(value)}")
+        if len(value) > most:
+            raise ValueError(f"{_HERE} must be a text of at most {most:,} characters, got one of {len(value):,}")
+        return value
+
+    return BeforeValidator(check)
+
+
+def Length(least: int, most: int) -> Any:
+    """How many entries a list or mapping may have."""
+    return Field(min_length=least, max_length=most)
+
+
+def validated(model: type[Model], data: object, what: str = "", *, error: MakeError = ValueError) -> Model:
+    """Check plain data against a model.
+
+    Args:
+        model: What is expected.
+        data: What a file holds (:mod:`legible_envs.support.plain_data`).
+        what: Begins the message, such as the name of the file.
+        error: Makes the exception of a message.
+
+    Raises:
+        ValueError: Or what ``error`` makes: says which value is wrong first, what was expected, and how many others
+            are wrong.
+    """
+    try:
+        return model.model_validate(data)
+    except ValidationError as refusal:
+        found = refusal.errors(include_url=False)
+        more = f" ({len(found) - 1} more {'is' if len(found) == 2 else 'are'} wrong)" if len(found) > 1 else ""
+        said = _said(model, found[0], what)
+        raise error(f"{what}: {said}{more}" if what and "`" in said[:1] else f"{said}{more}") from None
+
+
+def as_path(location: Iterable[str | int]) -> str:
+    """Keys and positions as one path.
+
+    Example:
+        >>> as_path(("subtasks", 2, "goals"))
+        'subtasks[2].goals'
+    """
+    text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location)
+    return text.removeprefix(".")
+
+
+def _said(model: type[BaseModel], problem: Mapping[str, Any], what: str) -> str:
+    """One of pydantic's problems in our words."""
+    kind, location, value = problem["type"], problem["loc"], problem["input"]
+    path = f"`{as_path(location)}`" if location else what or "it"
+    if kind == "value_error":
+        return str(problem["ctx"]["error"]).replace(_HERE, path)
+    if kind == "missing":
+        owner = f"`{as_path(location[:-1])}`" if location[:-1] else what or "it"
+        return f"{owner} lacks the key `{location[-1]}`"
+    if kind == "extra_forbidden":
+        return _unknown(model, location, what)
+    context = problem.get("ctx", {})
+    if kind in ("too_short", "too_long"):
+        bound = "at least" if kind == "too_short" else "at most"
+        number = context["min_length" if kind == "too_short" else "max_length"]
+        came = f"got {context['actual_length']:,}" if context.get("actual_length") is not None else "got more"
+        return f"{path} must have {bound} {number:,} {'entry' if number == 1 else 'entries'}, {came}"
+    wanted = _EXPECTED.get(kind)
+    return f"{path} must be {wanted}, got {shown(value)}" if wanted else f"{path}: {problem['msg']}, got {shown(value)}"
+
+
+_EXPECTED: Final = {
+    "bool_type": "true or false",
+    "dict_type": "a mapping",
+    "float_type": "a number",
+    "int_type": "an integer",
+    "list_type": "a list",
+    "mapping_type": "a mapping",
+    "model_type": "a mapping",
+    "none_required": "left out",
+    "string_type": "a text",
+}
+
+
+def _unknown(model: type[BaseModel], location: Sequence[str | int], what: str) -> str:
+    owner = f"`{as_path(location[:-1])}`" if location[:-1] else what or "it"
+    known = _keys_at(model, location[:-1])
+    near = get_close_matches(str(location[-1]), known, 1)
+    meant = f" (did you mean `{near[0]}`?)" if near else ""
+    listed = f"; known: {', '.join(known)}" if known else ""
+    return f"{owner} has the unknown key {shown(location[-1])}{meant}{listed}"
+
+
+def _keys_at(model: type[BaseModel], location: Sequence[str | int]) -> list[str]:
+    """Keys of the model at a place inside another; empty where there is none."""
+    here: Any = model
+    for part in location:
+        if isinstance(part, str) and isinstance(here, type) and issubclass(here, BaseModel):
+            if part not in here.model_fields:
+                return []
+            here = here.model_fields[part].annotation
+        here = _model_within(here)
+    return list(here.model_fields) if isinstance(here, type) and issubclass(here, BaseModel) else []
+
+
+def _model_within(annotation: Any) -> Any:
+    """The first model in an annotation such as ``list[Model] | None``; the annotation where there is none."""
+    if isinstance(annotation, type) and not hasattr(annotation, "__args__"):
+        return annotation
+    inner: Callable[[Any], Any] = _model_within
+    found = [inner(argument) for argument in getattr(annotation, "__args__", ())]
+    return next((each for each in found if isinstance(each, type) and issubclass(each, BaseModel)), annotation)

@@ -1,0 +1,75 @@
+"""Typed models: right data pass, wrong data are refused in the words of the other checks."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import pytest
+
+from legible_envs.errors import TaskError
+from legible_envs.support.models import Choice, FileModel, Flag, Length, Real, Text, Whole, validated
+
+
+class Part(FileModel):
+    name: Annotated[str, Text(20)]
+    count: Annotated[int, Whole(1, 1000)] = 1
+    at: Annotated[list[Annotated[float, Real(0, 1)]], Length(2, 2)] = [0.0, 0.0]
+
+
+class Content(FileModel):
+    parts: Annotated[list[Part], Length(1, 3)]
+    groups: dict[str, list[str]] = {}
+    most: Annotated[int, Whole(1)] | None = None
+    shared: Part | None = None
+    kind: Annotated[str, Choice("a", "b")] = "a"
+    on: Annotated[bool, Flag()] = True
+
+
+PART = {"name": "x"}
+
+
+def test_right_data_pass_with_defaults():
+    content = validated(Content, {"parts": [PART, {"name": "y", "count": 2, "at": [0, 1]}], "groups": {"g": ["x"]}})
+    assert [(part.name, part.count, part.at) for part in content.parts] == [("x", 1, [0, 0]), ("y", 2, [0, 1])]
+    assert (content.groups, content.most, content.shared, content.on) == ({"g": ["x"]}, None, None, True)
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (5, "the file must be a mapping, got 5"),
+        ({}, "the file lacks the key `parts`"),
+        ({"parts": []}, "the file: `parts` must have at least 1 entry, got 0"),
+        ({"parts": [PART] * 4}, "the file: `parts` must have at most 3 entries, got 4"),
+        ({"parts": 3}, "the file: `parts` must be a list, got 3"),
+        ({"parts": [3]}, "the file: `parts[0]` must be a mapping, got 3"),
+        ({"parts": [{}]}, "the file: `parts[0]` lacks the key `name`"),
+        ({"parts": [PART | {"count": 0}]}, "the file: `parts[0].count` must be an integer from 1 to 1000, got 0"),
+        ({"parts": [PART | {"count": True}]}, "the file: `parts[0].count` must be an integer from 1 to 1000, got True"),
+        ({"parts": [PART | {"count": "1"}]}, "the file: `parts[0].count` must be an integer from 1 to 1000, got '1'"),
+        (
+            {"parts": [PART | {"at": [0, 2.0]}]},
+            "the file: `parts[0].at[1]` must be a finite number from 0 to 1, got 2.0",
+        ),
+        ({"parts": [PART | {"at": [0]}]}, "the file: `parts[0].at` must have at least 2 entries, got 1"),
+        ({"parts": [{"name": ""}]}, "the file: `parts[0].name` must be a non-empty text, got ''"),
+        (
+            {"parts": [{"name": "x" * 21}]},
+            "the file: `parts[0].name` must be a text of at most 20 characters, got one of 21",
+        ),
+        (
+            {"parts": [PART], "shared": PART | {"coutn": 1}},
+            "the file: `shared` has the unknown key 'coutn' (did you mean `count`?); known: name, count, at",
+        ),
+        ({"parts": [PART], "groups": {"g": -1}}, "the file: `groups.g` must be a list, got -1"),
+        ({"parts": [PART], "groups": {"g": [1]}}, "the file: `groups.g[0]` must be a text, got 1"),
+        ({"parts": [PART], "most": 2**63}, f"the file: `most` must be an integer from 1 to {2**63 - 1}, got {2**63}"),
+        ({"parts": [PART], "kind": "c"}, "the file: `kind` must be 'a' or 'b', got 'c'"),
+        ({"parts": [PART], "on": 1}, "the file: `on` must be True or False, got 1"),
+        ({"parts": [3, {}], "on": 1}, "the file: `parts[0]` must be a mapping, got 3 (2 more are wrong)"),
+    ],
+)
+def test_wrong_data_are_refused_in_our_words(data, message):
+    with pytest.raises(TaskError) as refusal:
+        validated(Content, data, "the file", error=TaskError)
+    assert str(refusal.value) == message
