@@ -23,16 +23,8 @@ from optimizers.emitters.registry import EmitterSpec, emitter_name, make_emitter
 from optimizers.errors import CheckpointError, EmitterError, SearchError
 from optimizers.evaluator import Evaluator
 from optimizers.runs.checkpoint import CheckpointFolder, Header, refuse_other_settings
-from optimizers.runs.folder import (
-    SCHEMA,
-    RunFolder,
-    digests_of,
-    git_revision,
-    package_versions,
-    pickle_versions,
-    platform_name,
-    settings_of,
-)
+from optimizers.runs.folder import RunFolder, git_revision, package_versions, pickle_versions, platform_name
+from optimizers.runs.manifest import SCHEMA, digests_of, settings_of
 from optimizers.runs.result import SearchResult
 
 __all__ = ["SearchRun", "SearchState"]

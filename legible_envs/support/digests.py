@@ -50,8 +50,8 @@ def sealed(content: Mapping[str, Any]) -> dict[str, Any]:
         >>> content = sealed({"rows": [1]})
         >>> broken_seal(content), unsealed(content)
         ('', {'rows': [1]})
-        >>> broken_seal({**content, "rows": [2]})[:29]
-        'its content has the SHA-256 9'
+        >>> broken_seal({**content, "rows": [2]})[:44]
+        'it was changed since it was written, or dama'
     """
     plain = unsealed(content)
     return {**plain, SEAL: digest_of_json(plain)}
@@ -69,4 +69,6 @@ def broken_seal(content: Mapping[str, Any]) -> str:
     found = digest_of_json(unsealed(content))
     if content[SEAL] == found:
         return ""
-    return f"its content has the SHA-256 {found[:12]}…, not the one it was written with: it was changed since, or damaged"
+    return (
+        f"its content has the SHA-256 {found[:12]}…, not the one it was written with: it was changed since, or damaged"
+    )

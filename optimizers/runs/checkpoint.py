@@ -1,8 +1,9 @@
 """Checkpoints: the whole state of a search in one file, so that a killed run continues to the identical archive.
 
 A checkpoint is a line of JSON (settings, versions, and the digest of all) followed by a pickle. Digest, versions and
-settings are checked *before* anything is unpickled. The pickle is for continuing a run on the machine that began it: unpickling runs
-code, so continue only runs whose folder you trust. What a run publishes (``archive.npz``, ``config.json``) has none.
+settings are checked *before* anything is unpickled. The pickle is for continuing a run on the machine that began it:
+unpickling runs code, so continue only runs whose folder you trust. What a run publishes (``archive.npz``,
+``config.json``) has none.
 
 The workspace and the objective are not stored: they are given again on resuming, and settings that differ are refused.
 """

@@ -64,7 +64,7 @@ def test_a_line_that_was_cut_off_is_left_out(tmp_path: Path, workspace: Overcook
         (lambda f: (f / "config.json").write_text("{"), "not valid JSON"),
         (lambda f: (f / "config.json").write_text("[1]"), "holds a list"),
         (lambda f: (f / "config.json").write_text("{}"), "lacks"),
-        (lambda f: edit_config(f, schema=2), "has schema 2, this version reads schema 1"),
+        (lambda f: edit_config(f, schema=3), "has schema 3, this version reads schema 2"),
         (lambda f: (f / "archive.npz").unlink(), "no archive.npz"),
         (lambda f: (f / "archive.npz").write_bytes(b"PK\x03\x04 no"), "damaged"),
         (lambda f: (f / "archive.npz").write_bytes((f / "archive.npz").read_bytes()[:500]), "damaged"),
