@@ -132,7 +132,7 @@ def run_trials(
 
 def _about_damage(files: Sequence[str]) -> str:
     """What was found damaged, in a sentence; names a few."""
-    more = f", and {plural(len(files) - _NAMED, 'more')}" if len(files) > _NAMED else ""
+    more = f"; and {len(files) - _NAMED:,} more" if len(files) > _NAMED else ""
     return (
         f"{plural(len(files), 'kept file')} of trials cannot be used, and what is missing now is run again: "
         f"{'; '.join(files[:_NAMED])}{more}"

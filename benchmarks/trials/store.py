@@ -11,6 +11,7 @@ import hashlib
 import json
 import math
 import os
+import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
@@ -74,7 +75,8 @@ class TrialStore:
     @staticmethod
     def _key(name: str, trial: Trial) -> str:
         try:
-            text = json.dumps([name, dict(trial)], sort_keys=True, allow_nan=False)
+            as_kept = json.loads(json.dumps(dict(trial), allow_nan=False))
+            text = json.dumps([name, as_kept], sort_keys=True)
         except (TypeError, ValueError) as error:
             raise ValueError(f"a trial must hold plain JSON data ({error}); got {dict(trial)!r}") from error
         return hashlib.sha256(text.encode()).hexdigest()[:16]
@@ -129,7 +131,14 @@ class TrialStore:
         import pandas as pd
 
         rows = [dict(_columns(trial)) | row for trial in trials for row in self.load(trial) or ()]
+        self.warn_of_damaged()
         return pd.DataFrame(rows)
+
+    def warn_of_damaged(self) -> None:
+        """Warn that rows are missing where damaged files were met and not set aside."""
+        if self.damaged:
+            files = "; ".join(f"{path}: {why}" for path, why in sorted(self.damaged.items()))
+            warnings.warn(f"results are missing, run the same again: {files}", stacklevel=3)
 
     def _paths(self, kind: str, trial: Trial) -> Iterator[Path]:
         """Where a trial's file may be: under the name of the function, then under its former ones."""

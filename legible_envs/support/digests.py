@@ -53,7 +53,7 @@ def sealed(content: Mapping[str, Any]) -> dict[str, Any]:
         >>> broken_seal({**content, "rows": [2]})[:44]
         'it was changed since it was written, or dama'
     """
-    plain = unsealed(content)
+    plain = json.loads(json.dumps(unsealed(content)))  # keys that are numbers become the texts that a file holds
     return {**plain, SEAL: digest_of_json(plain)}
 
 

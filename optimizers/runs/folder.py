@@ -101,6 +101,11 @@ class RunFolder:
         return sorted(file.name for file in self.path.iterdir() if not is_leftover(file) and file != self.checkpoints)
 
     @property
+    def has_saved(self) -> bool:
+        """Whether the search there has saved layouts that :func:`optimizers.load_run` can read."""
+        return is_run_folder(self.path) and self.archive.is_file()
+
+    @property
     def _has_checkpoints(self) -> bool:
         return any(self.checkpoints.glob("*.checkpoint"))
 
@@ -115,11 +120,11 @@ class RunFolder:
                 f"{self.path} already holds a run: continue it with resume=True, choose another folder, or pass "
                 "overwrite=True to replace it"
             )
-        self._discard()
+        self.discard()
         self.path.mkdir(parents=True, exist_ok=True)
         remove_leftovers(self.path)
 
-    def _discard(self) -> None:
+    def discard(self) -> None:
         """Remove the run that lies there, or what is left of one whose removal was interrupted.
 
         The manifest gets another name first, in one step: before it the run is whole, from then on it is none.

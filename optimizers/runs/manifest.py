@@ -57,7 +57,7 @@ class _Emitter(FileModel):
 class _Archive(FileModel):
     dims: Annotated[list[Annotated[int, Whole(1)]], Length(2, 2), AfterValidator(check_archive_dims)]
     ranges: Annotated[list[Range], Length(2, 2)]
-    measure_names: Annotated[list[Word], Length(2, 2)] | None = None
+    measure_names: Annotated[list[Word], Length(2, 2)]
     score_floor: Number
 
 

@@ -321,7 +321,6 @@ def test_emitters_are_listed() -> None:
         (("optimize", "overcooked", "--emitter", "json:nobody"), None, "nobody"),
         (("optimize", "overcooked", "--prefix", "most"), None, "most"),
         (("optimize", "overcooked", "--max-distance", "-3"), None, "--max-distance"),
-        (("optimize", "overcooked", "--resume", "--out", "nowhere"), None, "nowhere"),
         (("optimize", "kitchenette"), None, "kitchenette"),
         (("report", "."), None, "config.json"),
         (("humans", "fetch", "--from", "not-the-archive"), None, "not-the-archive"),
