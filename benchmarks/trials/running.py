@@ -102,8 +102,13 @@ def run_trials(
     path = path_of(function)
     store = TrialStore(folder, name_of(path))
     unique = list({store.key(trial): dict(trial) for trial in trials}.values())
-    waiting = [(i, trial) for i, trial in enumerate(unique) if store.load(trial) is None]
-    store.failures()  # also those that are damaged
+    waiting = []
+    for i, trial in enumerate(unique):
+        if store.load(trial) is None:
+            waiting.append((i, trial))
+        else:
+            store.forget_failure(trial)  # of a run that was killed between keeping the result and this
+    store.failures()  # for those that are damaged
     event = Event(
         total=len(unique),
         done=len(unique) - len(waiting),

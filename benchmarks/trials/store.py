@@ -109,6 +109,10 @@ class TrialStore:
         """Keep the rows of a finished trial, and forget that it failed before."""
         content = {"schema": SCHEMA, "function": self.name.name, "cell": dict(trial), "rows": rows}
         self._write("cells", trial, content | {"seconds": round(seconds, 3), "worker": worker})
+        self.forget_failure(trial)
+
+    def forget_failure(self, trial: Trial) -> None:
+        """Remove the traceback of a trial that failed before; no harm where it never did."""
         for path in self._paths("failed", trial):
             path.unlink(missing_ok=True)
 
