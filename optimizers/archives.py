@@ -145,15 +145,15 @@ def make_archive(
     return WorkspaceArchive(seed=seed, **settings)
 
 
-def check_archive_dims(dims: Any) -> list[int]:
-    """Numbers of cells along each measure, as a list.
+def check_archive_dims(dims: Any, name: str = "dims") -> list[int]:
+    """Numbers of cells along each measure, as a list; messages call them by ``name``.
 
     Raises:
         ValueError: They are no whole numbers > 0, or make more than :data:`MOST_CELLS` cells.
     """
-    counts = [integer("dims", count, 1) for count in entries(dims)]
+    counts = [integer(name, count, 1) for count in entries(dims)]
     if not counts or math.prod(counts) > MOST_CELLS:
-        raise ValueError(f"`dims` must make an archive of 1 to {MOST_CELLS:,} cells, got {shown(dims)}")
+        raise ValueError(f"`{name}` must make an archive of 1 to {MOST_CELLS:,} cells, got {shown(dims)}")
     return counts
 
 

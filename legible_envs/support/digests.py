@@ -50,8 +50,8 @@ def sealed(content: Mapping[str, Any]) -> dict[str, Any]:
         >>> content = sealed({"rows": [1]})
         >>> broken_seal(content), unsealed(content)
         ('', {'rows': [1]})
-        >>> broken_seal({**content, "rows": [2]})[:44]
-        'it was changed since it was written, or dama'
+        >>> "it was changed since" in broken_seal({**content, "rows": [2]})
+        True
     """
     plain = json.loads(json.dumps(unsealed(content)))  # keys that are numbers become the texts that a file holds
     return {**plain, SEAL: digest_of_json(plain)}

@@ -54,8 +54,13 @@ class _Emitter(FileModel):
     settings: dict[str, Any] = Field(default_factory=dict)
 
 
+def _few_cells(dims: list[int]) -> list[int]:
+    """Refuse too many cells before anything is allocated for them."""
+    return check_archive_dims(dims, "archive.dims")
+
+
 class _Archive(FileModel):
-    dims: Annotated[list[Annotated[int, Whole(1)]], Length(2, 2), AfterValidator(check_archive_dims)]
+    dims: Annotated[list[Annotated[int, Whole(1)]], Length(2, 2), AfterValidator(_few_cells)]
     ranges: Annotated[list[Range], Length(2, 2)]
     measure_names: Annotated[list[Word], Length(2, 2)]
     score_floor: Number
@@ -134,7 +139,7 @@ def manifest_from(text: str, file: str) -> dict[str, Any]:
     model = _ManifestOfEmitters if several else _ManifestOfOneEmitter
     validated(model, {key: value for key, value in plain.items() if key != "schema"}, file, error=SearchError)
     if schema == SCHEMA and (why := broken_seal(content)):
-        raise SearchError(f"{file}: {why}. Restore it; or continue the search (resume), which writes it anew")
+        raise SearchError(f"{file}: {why}. Restore it; a search with a checkpoint writes it anew when resumed")
     return plain
 
 

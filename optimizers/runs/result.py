@@ -262,8 +262,8 @@ def _check_digests(
         if known and known[name] != found[name]:
             raise SearchError(
                 f"{file} is not what the search left there: its content has the SHA-256 {found[name][:12]}…, the "
-                f"manifest names {known[name][:12]}…. It was changed since, or damaged: restore it; or continue the "
-                "search (resume), which writes it anew"
+                f"manifest names {known[name][:12]}…. It was changed since, or damaged: restore it; a search "
+                "with a checkpoint writes it anew when resumed"
             )
 
 
