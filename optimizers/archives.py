@@ -2,24 +2,40 @@
 
 from __future__ import annotations
 
-import zipfile
-import zlib
+import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
 from ribs.archives import GridArchive
 
 from legible_envs.key_space import KeySpace
-from legible_envs.support.files import write_npz
+from legible_envs.support.files import open_npz, write_npz
+from legible_envs.support.validation import entries, integer, shown
 from legible_envs.workspace import Workspace
 from optimizers.errors import SearchError
 
 if TYPE_CHECKING:
     from ribs.archives import ArchiveBase
 
-__all__ = ["FIELDS", "WorkspaceArchive", "archive_arrays", "make_archive", "read_archive", "write_archive"]
+__all__ = [
+    "FIELDS",
+    "MOST_BYTES",
+    "MOST_CELLS",
+    "WorkspaceArchive",
+    "archive_arrays",
+    "check_archive_dims",
+    "make_archive",
+    "read_archive",
+    "write_archive",
+]
+
+MOST_CELLS: Final = 10_000_000
+"""How many cells an archive may have."""
+
+MOST_BYTES: Final = 2**32
+"""How large the genomes, scores and measures of an archive may be together, were all its cells filled."""
 
 FIELDS = ("solution", "objective", "measures", "index")
 """Arrays of ``archive.npz``, one row per elite in ascending cell index."""
@@ -103,6 +119,9 @@ def make_archive(
 
     Returns:
         An empty archive.
+
+    Raises:
+        ValueError: It would have more than :data:`MOST_CELLS` cells, or take more than :data:`MOST_BYTES` bytes.
     """
     if isinstance(workspace, KeySpace):
         size, dtype = workspace.solution_dim, np.dtype(np.float64)
@@ -115,7 +134,27 @@ def make_archive(
         "qd_score_offset": float(workspace.score_floor if score_floor is None else score_floor),
         "solution_dtype": dtype,
     }
-    return WorkspaceArchive(seed=seed, **{**settings, **options})
+    settings |= options
+    settings["dims"] = check_archive_dims(settings["dims"])
+    row = int(settings["solution_dim"]) * dtype.itemsize + 8 * (1 + len(settings["dims"]))
+    if (size := row * math.prod(settings["dims"])) > MOST_BYTES:
+        raise ValueError(
+            f"an archive of {math.prod(settings['dims']):,} cells of {row:,} bytes takes {size:,} bytes; at most "
+            f"{MOST_BYTES:,} are kept"
+        )
+    return WorkspaceArchive(seed=seed, **settings)
+
+
+def check_archive_dims(dims: Any, name: str = "dims") -> list[int]:
+    """Numbers of cells along each measure, as a list; messages call them by ``name``.
+
+    Raises:
+        ValueError: They are no whole numbers > 0, or make more than :data:`MOST_CELLS` cells.
+    """
+    counts = [integer(name, count, 1) for count in entries(dims)]
+    if not counts or math.prod(counts) > MOST_CELLS:
+        raise ValueError(f"`{name}` must make an archive of 1 to {MOST_CELLS:,} cells, got {shown(dims)}")
+    return counts
 
 
 def archive_arrays(archive: ArchiveBase) -> dict[str, npt.NDArray[Any]]:
@@ -136,20 +175,20 @@ def read_archive(path: Path) -> dict[str, npt.NDArray[Any]]:
 
     Raises:
         FileNotFoundError: There is no such file.
-        SearchError: The file is not such an archive.
+        SearchError: The file is not such an archive, damaged, or too large.
     """
     refusal = f"{path} is not an archive written by a search, or it is damaged"
     try:
-        with np.load(path, allow_pickle=False) as stored:
+        with open_npz(path, most_bytes=MOST_BYTES) as stored:
             missing = [name for name in FIELDS if name not in stored]
             if missing:
                 raise SearchError(f"{refusal}: it lacks the arrays {missing}, it has {sorted(stored)}")
             arrays = {name: stored[name] for name in FIELDS}
     except FileNotFoundError:
         raise
-    except (ValueError, KeyError, OSError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+    except (ValueError, KeyError, OSError) as error:
         raise SearchError(f"{refusal}: {error}") from error
-    lengths = {name: len(values) for name, values in arrays.items()}
+    lengths = {name: values.shape[0] if values.ndim else None for name, values in arrays.items()}
     if len(set(lengths.values())) != 1:
         raise SearchError(f"{refusal}: its arrays have different lengths {lengths}")
     return arrays

@@ -18,12 +18,13 @@ from ribs.schedulers import Scheduler
 from legible_envs.key_space import KeySpace
 from legible_envs.support.files import remove_leftovers
 from legible_envs.workspace import Workspace
-from optimizers.archives import WorkspaceArchive, make_archive, write_archive
+from optimizers.archives import WorkspaceArchive, archive_arrays, make_archive, write_archive
 from optimizers.emitters.registry import EmitterSpec, emitter_name, make_emitter
 from optimizers.errors import CheckpointError, EmitterError, SearchError
 from optimizers.evaluator import Evaluator
-from optimizers.runs.checkpoint import CheckpointFolder, Header
+from optimizers.runs.checkpoint import CheckpointFolder, Header, refuse_other_settings
 from optimizers.runs.folder import RunFolder, git_revision, package_versions, pickle_versions, platform_name
+from optimizers.runs.manifest import SCHEMA, digests_of, settings_of
 from optimizers.runs.result import SearchResult
 
 __all__ = ["SearchRun", "SearchState"]
@@ -99,20 +100,56 @@ class SearchRun:
 
     def open(self, *, resume: bool | str, overwrite: bool) -> None:
         """Begin a new run, or take up the one in the folder."""
-        if self.folder is not None:
-            self._checkpoints = CheckpointFolder(self.folder.checkpoints, {"workspace": self.workspace})
-            if resume is True or (resume == "auto" and self.folder.holds_a_run):
-                self.state = self._checkpoints.load(self._settings, pickle_versions())
-                remove_leftovers(self.folder.path)
-            else:
-                self.folder.create(overwrite=overwrite)
-                # The first checkpoint comes before any other file: whatever has a manifest can be resumed.
-                self.save()
-            self._config = self._manifest()
-            self.folder.write_config(self._config)
-            self.folder.rewrite_metrics(self.state.history)
+        if self.folder is None:
+            self._config = self._manifest({})
+            return
+        self._checkpoints = CheckpointFolder(self.folder.checkpoints, {"workspace": self.workspace})
+        if resume is True or (resume == "auto" and self.folder.holds_a_run):
+            self._take_up()
         else:
-            self._config = self._manifest()
+            # What can fail comes before anything is written: a run that is to be replaced is still whole then.
+            self._checkpoints.check(self.state)
+            self._config = self._manifest({})
+            self.folder.create(overwrite=overwrite)
+            self._begin()
+
+    def _begin(self) -> None:
+        """Write the first files: the manifest before all others, so that whatever lies there can be resumed."""
+        assert self.folder is not None
+        self.folder.write_config(self._config)
+        self.folder.rewrite_metrics([])
+        self.save()
+
+    def _take_up(self) -> None:
+        """Go on from the newest checkpoint; begin anew where the run was stopped before its first one."""
+        assert self.folder is not None
+        if self.folder.has_only_begun:
+            before = self.folder.read_config()
+            refuse_other_settings(self.folder.path, settings_of(before), self._settings)
+            warnings.warn(
+                f"{self.folder.path}: this search was stopped before its first checkpoint; it begins anew with the "
+                "same settings",
+                stacklevel=4,
+            )
+            remove_leftovers(self.folder.path)
+            self._checkpoints.check(self.state)
+            self._config = self._manifest(before)
+            self._begin()
+            return
+        self.state = self._checkpoints.load(self._settings, pickle_versions())
+        remove_leftovers(self.folder.path)
+        self._config = self._manifest(self._config_before())
+        self.folder.write_config(self._config)
+        self.folder.rewrite_metrics(self.state.history)
+
+    def _config_before(self) -> dict[str, Any]:
+        """The manifest of the run that is continued; empty where it is lost: all of it but its date is known."""
+        assert self.folder is not None
+        try:
+            return self.folder.read_config()
+        except SearchError as error:
+            warnings.warn(f"{error}; it is written anew from the checkpoint", stacklevel=5)
+            return {}
 
     def finish(self, stopped: str) -> SearchResult:
         """Log the last batch, prune the best layout, and write everything."""
@@ -123,6 +160,7 @@ class SearchRun:
             self.save()
             if result.best_genome is not None:
                 self.folder.write_best(result.best_layout)
+            result.config["digests"] = digests_of(archive_arrays(result.archive), result.history)
             self.folder.write_config(result.config)
         if result.best_genome is None:
             warnings.warn(
@@ -261,12 +299,8 @@ class SearchRun:
         }
         return _as_json(described)
 
-    def _manifest(self) -> dict[str, Any]:
-        """The manifest of the run; keeps the date and versions of its beginning on resuming."""
-        before: dict[str, Any] = {}
-        if self.folder is not None:
-            with contextlib.suppress(SearchError):
-                before = self.folder.read_config()
+    def _manifest(self, before: Mapping[str, Any]) -> dict[str, Any]:
+        """The manifest of the run; keeps the date of its beginning where it is continued."""
         emitters = [
             {**described, "settings": getattr(emitter, "settings", {})}
             for described, emitter in zip(self._settings["emitter"], self.state.scheduler.emitters, strict=True)
@@ -316,7 +350,7 @@ class SearchRun:
             seconds=state.seconds,
             evaluation_seconds=state.evaluation_seconds,
             stopped=stopped,
-            config={"schema": 1, **self._config, "result": summary},
+            config={"schema": SCHEMA, **self._config, "result": summary},
             folder=None if self.folder is None else self.folder.path,
         )
 

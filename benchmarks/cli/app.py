@@ -115,7 +115,8 @@ main.add_command(reproduce)
 )
 @click.option("--set", "assigned", multiple=True, type=Assignment(), metavar="NAME=VALUE",
               help="Another setting of the workspace; repeatable.")  # fmt: skip
-@click.option("--resume", is_flag=True, help="Continue the search in the --out folder, with its own settings.")
+@click.option("--resume", is_flag=True,
+              help="Continue the search in the --out folder, as it was begun; begin one if it is empty.")  # fmt: skip
 @click.option("--overwrite", is_flag=True, help="Replace a search that lies in the --out folder.")
 @click.option("--quiet", is_flag=True, help="Show no progress bar.")
 @out_folder

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from benchmarks.cli.destinations import DestinationFolder
+from legible_envs.support.files import write_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -131,6 +132,6 @@ def _print(console: Console, name: str, scores: pd.DataFrame, out: Path | None) 
     console.print(f"{counts}; {about}", style="dim", markup=False)
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
-        (out / f"{name}.md").write_text(f"{to_markdown(rows)}\n{counts}; {about}.\n", encoding="utf-8")
+        write_text(out / f"{name}.md", f"{to_markdown(rows)}\n{counts}; {about}.\n")
         write_table(out / f"{name}.csv", accuracy_table(scores))
         console.print(f"tables: {out / name}.md, {out / name}.csv", markup=False)

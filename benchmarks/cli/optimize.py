@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import re
 import shlex
+import warnings
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -74,14 +75,15 @@ def run_search(domain: str, out: Path, settings: Mapping[str, Any], given: Colle
             resume; its checkpoint cannot be continued, or the search cannot go on.
     """
     presenter = presenter_of(domain)
-    if is_run_folder(out) and not (settings["resume"] or settings["overwrite"]):
+    folder = RunFolder(out)
+    if folder.holds_a_run and not (settings["resume"] or settings["overwrite"]):
         raise SearchError(
             f"{out} already holds a search: add --resume to continue it, --overwrite to replace it, or choose another "
             "folder with --out"
         )
     config: dict[str, Any] = {"workspace": domain}
-    if settings["resume"]:
-        before = RunFolder(out).read_config()
+    if settings["resume"] and _continues(folder, presenter, quiet=settings["quiet"]):
+        before = folder.settings()
         config = dict(before["workspace"])
         if not _same_workspace(str(config.get("workspace")), domain):
             raise SearchError(f"{out} holds a search of {config.get('workspace')!r}, not of {domain!r}")
@@ -91,8 +93,31 @@ def run_search(domain: str, out: Path, settings: Mapping[str, Any], given: Colle
         raise click.UsageError("--set workspace does not apply: the workspace is the first argument")
     config |= presenter.design(settings) | assigned
     parts = presenter.parts(config, settings, out)
+    if settings["overwrite"] and len(parts) > 1:
+        _discard(parts[1:], settings)
     results = [_search_part(domain, part, settings, out) for part in parts]
     _tell(presenter, results[0], parts)
+
+
+def _continues(folder: RunFolder, presenter: Presenter, *, quiet: bool) -> bool:
+    """Whether ``--resume`` finds a search to go on with; says which, on standard error.
+
+    Raises:
+        SearchError: The folder holds other files and no search: it is hardly the one that was meant.
+    """
+    shown = click.format_filename(folder.path)
+    if folder.holds_a_run:
+        if not (quiet or folder.has_only_begun):
+            click.echo(f"going on with the search in {shown}", err=True)
+        return True
+    others = sorted(set(folder.others()) - presenter.own_files)
+    if others:
+        raise SearchError(
+            f"{shown} is not the folder of a search: it has no config.json, and holds other files ({others[0]}). Name "
+            "the folder with --out, or leave out --resume to begin a search there"
+        )
+    click.echo(f"there is no search in {shown} to go on with: one begins", err=True)
+    return False
 
 
 def _same_workspace(one: str, other: str) -> bool:
@@ -142,7 +167,7 @@ def _search_part(domain: str, part: Part, settings: Mapping[str, Any], out: Path
             iterations=None if iterations is None else (int(iterations[0]), int(iterations[1])),
             seed=settings["seed"],
             checkpoint=part.folder,
-            resume=("auto" if part.title else True) if settings["resume"] else False,
+            resume="auto" if settings["resume"] else False,
             overwrite=settings["overwrite"],
             progress=False if settings["quiet"] else None,
         )
@@ -163,6 +188,33 @@ def _search_part(domain: str, part: Part, settings: Mapping[str, Any], out: Path
     if part.folder != out:
         write_pictures(part.folder)
     return result
+
+
+def _discard(parts: Collection[Part], settings: Mapping[str, Any]) -> None:
+    """Remove the searches that lie in the folders of parts, before the first part replaces its own.
+
+    Whenever this is interrupted, no folder holds parts that were searched with different settings, so that all can be
+    continued. What the search refuses is refused before anything is removed: one layout is searched first.
+    """
+    from optimizers import search
+
+    iterations = settings.get("iterations")
+    for part in parts:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            search(
+                part.workspace,
+                objective=settings["objective"],
+                max_distance=settings["max_distance"],
+                emitter=settings["emitter"],
+                emitter_options=_emitter_options(settings),
+                evaluations=None if iterations else 1,
+                iterations=(min(1, int(iterations[0])), 0) if iterations else None,
+                seed=settings["seed"],
+                progress=False,
+            )
+    for part in parts:
+        RunFolder(part.folder).discard()
 
 
 def _emitter_options(settings: Mapping[str, Any]) -> Any:

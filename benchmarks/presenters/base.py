@@ -227,12 +227,14 @@ class Presenter:
         name: Name of the workspace.
         noun: The word for one layout.
         options: Options of ``legible optimize`` that only this workspace has.
+        own_files: Names of files that :meth:`parts` writes into the folder before its search begins.
         texts: Texts of the report.
     """
 
     name: str = ""
     noun: str = "layout"
     options: frozenset[str] = frozenset()
+    own_files: frozenset[str] = frozenset()
     texts: ReportTexts = ReportTexts()
 
     def __init__(self, name: str | None = None) -> None:

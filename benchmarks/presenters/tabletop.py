@@ -232,6 +232,7 @@ class TablePresenter(Presenter):
     name = "tabletop"
     noun = "table"
     options = frozenset({"task", "condition"})
+    own_files = frozenset({LIST})
     texts = ReportTexts(
         axes={
             "least distance": "least distance of two objects, m",

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from legible_envs.support.names import check_file_name
+from legible_envs.support.plain_data import parse_json
+from legible_envs.support.text import read_text
+from legible_envs.support.validation import choice, shown
 from optimizers.errors import SearchError
+from optimizers.runs.folder import RunFolder
 
 if TYPE_CHECKING:
     from benchmarks.presenters.base import Panel
@@ -29,21 +31,23 @@ def panels_of(run: SearchResult) -> list[Panel]:
     """The sorted baseline and the best layout of every condition searched in a run's folder.
 
     A condition whose search has not found anything yet is left out.
+
+    Raises:
+        SearchError: A file of one of the searches is damaged.
     """
     from benchmarks.presenters.base import Panel
     from optimizers import load_run
 
-    runs = {run.config["workspace"]["condition"]: run}
+    workspace: Any = run.workspace
+    runs: dict[str, SearchResult] = {workspace.condition: run}
     root = _folder_of(run)
     for name, folder in listed(root).items():
         if folder != ".":
-            try:
-                found_there = load_run(root / folder)
-            except SearchError:
+            if not RunFolder(root / folder).has_saved:
                 continue
+            found_there = load_run(root / folder)
             if found_there.best_genome is not None:
                 runs[name] = found_there
-    workspace: Any = run.workspace
     baseline, scorer = workspace.baseline, workspace.scorer
     found = [("Baseline", baseline, "objects sorted by colour and shape")]
     for name, title in CONDITIONS.items():
@@ -89,19 +93,18 @@ def _folder_of(run: SearchResult) -> Path:
 
 def listed(folder: Path) -> dict[str, str]:
     """Conditions searched together, each with its folder; empty where there is one only."""
+    file = folder / LIST
     try:
-        data = json.loads((folder / LIST).read_text(encoding="utf-8"))
+        data = parse_json(read_text(file))
     except FileNotFoundError:
         return {}
     except ValueError as error:
-        raise SearchError(f"{folder / LIST} is not valid JSON: {error}") from error
+        raise SearchError(f"{file}: {error}") from error
     if not isinstance(data, dict) or not set(data) <= set(CONDITIONS):
-        raise SearchError(f"{folder / LIST} must map conditions {list(CONDITIONS)} to folders")
-    folders = {key: str(value) for key, value in data.items()}
-    for key, name in folders.items():  # the file may come from a stranger, and searches write there
-        if name != ".":
-            check_file_name(f"the folder of `{key}` in {folder / LIST}", name, error=SearchError)
-    return folders
+        raise SearchError(f"{file} must map conditions {list(CONDITIONS)} to folders, got {shown(data)}")
+    for name, where in data.items():
+        choice(f"`{name}` in {file}", where, (".", name), error=SearchError)
+    return data
 
 
 def beta_of(workspace: Any) -> float:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import base64
+import hashlib
 import json
 import math
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,7 +14,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 from benchmarks.csv_tables import write_tables
 from benchmarks.reports.pages import page_environment, table_of
+from legible_envs.support.digests import broken_seal, sealed
 from legible_envs.support.files import write_text
+from legible_envs.support.plain_data import parse_json
+from legible_envs.support.text import read_text
+from legible_envs.support.validation import shown
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -41,7 +47,20 @@ _FIGURES: Final = {
     "confusion": "Confusion matrix: true goals as rows, predicted goals as columns",
 }
 """Figures by name, and what each shows, for readers who cannot see it."""
+_TABLES: Final = (
+    "predictions",
+    "accuracy",
+    "metrics",
+    "confusion",
+    "omitted",
+    "learning_curve",
+    "comparison_anova",
+    "comparison_means",
+    "comparison_pairs",
+)
 _CONFUSION_AT: Final = 0.5
+_SCHEMA: Final = 2
+_UNSEALED: Final = 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,11 +233,15 @@ def write_evaluation(results: PredictionResults, folder: Path, *, title: str = "
     from legible_envs.drawing.charts import save_figure
 
     folder.mkdir(parents=True, exist_ok=True)
+    # Files of an earlier evaluation must not stand beside those of this one, also where this is interrupted: what says
+    # that there is an evaluation goes first and comes last.
+    for name in (_FILE, *(f"{name}.svg" for name in _FIGURES), *(f"{name}.csv" for name in _TABLES)):
+        (folder / name).unlink(missing_ok=True)
     written = write_tables(folder, _tables(results).items())
-    for name in _FIGURES:  # those of an earlier evaluation must not stand beside this one's tables
-        (folder / f"{name}.svg").unlink(missing_ok=True)
-    written += [save_figure(folder / f"{name}.svg", figure) for name, figure in _drawn(results).items()]
-    write_text(folder / _FILE, json.dumps(_about(results), indent=1))
+    figures = [save_figure(folder / f"{name}.svg", figure) for name, figure in _drawn(results).items()]
+    about = {**_about(results), "figures": {path.stem: _digest_of_file(path) for path in figures}}
+    write_text(folder / _FILE, json.dumps(sealed(about), indent=1))
+    written += figures
     write_text(folder / "report.html", _page(folder, title))
     return [*written, folder / _FILE, folder / "report.html"]
 
@@ -268,7 +291,7 @@ def _about(results: PredictionResults) -> dict[str, Any]:
     """The content of the section of a report, as JSON."""
     found = results.evaluation
     return {
-        "schema": 1,
+        "schema": _SCHEMA,
         "definition": found.definition,
         "walks": int(found.table["trajectory"].nunique()),
         "participants": int(found.table["participant"].nunique()),
@@ -295,12 +318,22 @@ def _finite(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
 def evaluation_section(folder: Path) -> str | None:
     """The section of a report about what :func:`write_evaluation` wrote into a folder, or None if there is none.
 
-    Figures become images within the page, so that no script in their files can run.
+    Figures become images within the page, so that no script in their files can run. Where one of the files is damaged
+    or was changed, a warning names it and the section is left out.
     """
+    from jinja2 import TemplateError
+
+    file = folder / _FILE
     try:
-        about = json.loads((folder / _FILE).read_text(encoding="utf-8"))
-        if about["schema"] != 1:
-            return None
+        text = read_text(file)
+    except FileNotFoundError:
+        return None
+    except ValueError as error:
+        _warn_of(file, str(error))
+        return None
+    try:
+        about = parse_json(text)
+        _check(about, folder)
         figures = [
             (name, _FIGURES[name], _as_image(folder / f"{name}.svg"))
             for name in _FIGURES
@@ -313,8 +346,38 @@ def evaluation_section(folder: Path) -> str | None:
             summary=table_of([("", about["summary"])], 3),
             comparisons=[(each, table_of([("", _in_words(each["pairs"]))], 3)) for each in about["comparisons"]],
         )
-    except (OSError, ValueError, KeyError, TypeError):
-        return None
+    except (OSError, ValueError) as error:
+        _warn_of(file, str(error))
+    except (KeyError, TypeError, AttributeError, TemplateError):
+        _warn_of(file, "it is no evaluation")
+    return None
+
+
+def _warn_of(file: Path, why: str) -> None:
+    said = f"{file}: {why}; its section is left out of the report: evaluate again"
+    warnings.warn(said, stacklevel=3)
+
+
+def _check(about: Any, folder: Path) -> None:
+    """Refuse the content of an evaluation that is not what was written; that of earlier versions has no digests.
+
+    Raises:
+        ValueError: It is not.
+    """
+    schema = about.get("schema") if isinstance(about, dict) else None
+    if isinstance(schema, bool) or schema not in (_UNSEALED, _SCHEMA):
+        raise ValueError(f"it has schema {shown(schema)}, this version reads schema {_SCHEMA}")
+    if schema == _UNSEALED:
+        return
+    if why := broken_seal(about):
+        raise ValueError(why)
+    for name, digest in about["figures"].items():
+        if _digest_of_file(folder / f"{name}.svg") != digest:
+            raise ValueError(f"{name}.svg beside it was changed since it was written, or damaged")
+
+
+def _digest_of_file(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def _in_words(pairs: list[dict[str, Any]]) -> list[dict[str, Any]]:

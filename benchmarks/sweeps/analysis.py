@@ -28,6 +28,7 @@ def results(sweep: Sweep, folder: str | Path) -> pd.DataFrame:
 
     store = TrialStore(folder, SEARCH)
     rows = [variant.labels | row for variant in sweep.variants() for row in store.load(variant.trial) or ()]
+    store.warn_of_damaged()
     return pd.DataFrame(rows, columns=None if rows else [*_SETTINGS, "seed"])
 
 

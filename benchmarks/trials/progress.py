@@ -59,7 +59,7 @@ class TrialsProgress:
         from rich.console import Group
         from rich.text import Text
 
-        counts = {"found": event.found, "retried": event.retried, "failed": event.failed}
+        counts = {"found": event.found, "damaged": len(event.damaged), "retried": event.retried, "failed": event.failed}
         status = " · ".join(f"{count} {what}" for what, count in counts.items() if count)
         self._bar.update(self._task, total=event.total, completed=event.done + event.failed, status=status)
         workers = sorted(event.running.items())

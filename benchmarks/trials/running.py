@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,6 +22,8 @@ __all__ = ["Event", "TrialsFailed", "run_trials"]
 ATTEMPTS: Final = 2
 MOST_WORKERS: Final = 1_024
 """Processes on this machine."""
+_NAMED: Final = 5
+"""How many damaged files a warning names; ``Event.damaged`` names all."""
 
 
 @dataclass
@@ -33,6 +36,8 @@ class Event:
         found: Those found on disk.
         failed: Trials given up.
         retried: Attempts that failed and were repeated.
+        damaged: Kept files that were found damaged and set aside: a line for each, with file and reason. Trials that
+            are left without a result by it are run again.
         running: What each worker runs: its name and the trial.
         last: The newest outcome, if any.
     """
@@ -42,6 +47,7 @@ class Event:
     found: int = 0
     failed: int = 0
     retried: int = 0
+    damaged: tuple[str, ...] = ()
     running: dict[str, Trial] = field(default_factory=dict)
     last: Outcome | None = None
 
@@ -78,9 +84,10 @@ def run_trials(
         function: Takes a trial, returns a mapping or a list of mappings (result rows); defined at the top of a module
             that workers can import, or its ``"module:name"``.
         trials: Settings and seed, one mapping of plain data each; equal ones are run once.
-        folder: Where results are kept. Trials that have a result there are not run again; trials that failed are. A
-            result belongs to its trial and to the name of the function (see :func:`.trial_function`), which is its path
-            unless it was given one.
+        folder: Where results are kept. Trials that have a result there are not run again; trials that failed are, and
+            those whose file is damaged: a warning names it, and it is set aside as ``NAME.json.damaged``. A result
+            belongs to its trial and to the name of the function (see :func:`.trial_function`), which is its path unless
+            it was given one.
         workers: Processes on this machine; all cores if None; 1 runs everything in this process. A script of your own
             that starts several needs the usual ``if __name__ == "__main__":``.
         scheduler: Address of a Dask scheduler, such as ``"tcp://10.0.0.1:8786"``, whose workers can import
@@ -97,24 +104,46 @@ def run_trials(
     path = path_of(function)
     store = TrialStore(folder, name_of(path))
     unique = list({store.key(trial): dict(trial) for trial in trials}.values())
-    waiting = [(i, trial) for i, trial in enumerate(unique) if store.load(trial) is None]
-    event = Event(total=len(unique), done=len(unique) - len(waiting), found=len(unique) - len(waiting))
+    waiting = []
+    for i, trial in enumerate(unique):
+        if store.load(trial) is None:
+            waiting.append((i, trial))
+        else:
+            store.forget_failure(trial)  # of a run that was killed between keeping the result and this
+    store.failures()  # for those that are damaged
+    event = Event(
+        total=len(unique),
+        done=len(unique) - len(waiting),
+        found=len(unique) - len(waiting),
+        damaged=tuple(store.set_damaged_aside()),
+    )
+    if event.damaged:
+        warnings.warn(_about_damage(event.damaged), stacklevel=2)
     report = progress or (lambda event: None)
     report(event)
     if waiting:
         _run(_pool(workers, scheduler, len(waiting)), path, unique, waiting, store, event, report)
     table = store.table(unique)
-    keys = {store.key(trial) for trial in unique}
-    failures = [failure for failure in store.failures() if store.key(failure["cell"]) in keys]
     if event.failed:
-        last = failures[-1]["traceback"].strip().splitlines()[-1]
+        keys = {store.key(trial) for trial in unique if store.load(trial) is None}
+        failures = [failure for failure in store.failures() if store.key(failure["cell"]) in keys]
+        said = [line for failure in failures[-1:] for line in failure["traceback"].strip().splitlines()[-1:]]
         raise TrialsFailed(
             f"{event.failed} of {plural(event.total, 'trial')} failed {ATTEMPTS} times; the others are finished. "
-            f"Tracebacks: {store.folder / 'failed'}. The last: {last}",
+            f"Tracebacks: {store.folder / 'failed'}.{' The last: ' + said[0] if said else ''}",
             failures,
             table,
         )
     return table
+
+
+def _about_damage(files: Sequence[str]) -> str:
+    """What was found damaged, in a sentence; names a few."""
+    more = f"; and {len(files) - _NAMED:,} more" if len(files) > _NAMED else ""
+    return (
+        f"{plural(len(files), 'kept file')} of trials cannot be used, and what is missing now is run again: "
+        f"{'; '.join(files[:_NAMED])}{more}"
+    )
 
 
 def _run(

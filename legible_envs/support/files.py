@@ -20,7 +20,16 @@ import numpy.typing as npt
 
 from legible_envs.support.file_kinds import describe_file, is_zip
 
-__all__ = ["MOST_ARRAYS", "MOST_BYTES", "open_npz", "remove_leftovers", "write_atomically", "write_npz", "write_text"]
+__all__ = [
+    "MOST_ARRAYS",
+    "MOST_BYTES",
+    "is_leftover",
+    "open_npz",
+    "remove_leftovers",
+    "write_atomically",
+    "write_npz",
+    "write_text",
+]
 
 MOST_BYTES: Final = 2**30
 """How large the arrays of an ``.npz`` may be together, uncompressed, unless a caller asks for more."""
@@ -192,9 +201,14 @@ def _damaged(error: Exception) -> Exception:
     return ValueError(f"it is a damaged or incomplete .npz ({said or type(error).__name__})")
 
 
+def is_leftover(path: Path) -> bool:
+    """Whether a file is, by its name, a temporary one of a process that was killed while it wrote."""
+    return path.name.startswith(".") and _MARK in path.name
+
+
 def remove_leftovers(folder: Path) -> None:
     """Remove temporary files that a killed process left in a folder."""
-    for leftover in folder.glob(f".*{_MARK}*"):
+    for leftover in filter(is_leftover, folder.glob(".*")):
         with contextlib.suppress(OSError):
             leftover.unlink()
 

@@ -1,8 +1,9 @@
 """Checkpoints: the whole state of a search in one file, so that a killed run continues to the identical archive.
 
-A checkpoint is a line of JSON (settings, versions, digest) followed by a pickle. Settings, versions and digest are
-checked *before* anything is unpickled. The pickle is for continuing a run on the machine that began it: unpickling runs
-code, so continue only runs whose folder you trust. What a run publishes (``archive.npz``, ``config.json``) has none.
+A checkpoint is a line of JSON (settings, versions, and the digest of all) followed by a pickle. Digest, versions and
+settings are checked *before* anything is unpickled. The pickle is for continuing a run on the machine that began it:
+unpickling runs code, so continue only runs whose folder you trust. What a run publishes (``archive.npz``,
+``config.json``) has none.
 
 The workspace and the objective are not stored: they are given again on resuming, and settings that differ are refused.
 """
@@ -19,12 +20,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from legible_envs.support.digests import SEAL, digest_of_json
 from legible_envs.support.files import remove_leftovers, write_atomically
+from legible_envs.support.validation import shown
 from optimizers.errors import CheckpointError
 
-__all__ = ["SCHEMA", "CheckpointFolder", "Header"]
+__all__ = ["SCHEMA", "CheckpointFolder", "Header", "refuse_other_settings"]
 
-SCHEMA = 1
+SCHEMA = 2
+_UNSEALED_HEADER = 1
+"""The format before: its digest is of the pickle alone. It is still read."""
 _MAGIC = b"legible-envs checkpoint\n"
 _KEEP = 2
 
@@ -59,6 +64,14 @@ class CheckpointFolder:
     def __bool__(self) -> bool:
         return bool(self._files())
 
+    def check(self, state: Any) -> None:
+        """Make sure that a state can be saved, before anything is written.
+
+        Raises:
+            CheckpointError: It does not pickle.
+        """
+        self._pickled(state)
+
     def save(self, header: Header, state: Any) -> None:
         """Write a checkpoint, then drop all but the newest two.
 
@@ -67,16 +80,14 @@ class CheckpointFolder:
             OSError: The file could not be written; earlier checkpoints are intact.
         """
         payload = self._pickled(state)
-        line = json.dumps(
-            {
-                "schema": SCHEMA,
-                "settings": header.settings,
-                "versions": header.versions,
-                "iteration": header.iteration,
-                "bytes": len(payload),
-                "sha256": hashlib.sha256(payload).hexdigest(),
-            }
-        ).encode()
+        fields = {
+            "schema": SCHEMA,
+            "settings": header.settings,
+            "versions": header.versions,
+            "iteration": header.iteration,
+            "bytes": len(payload),
+        }
+        line = json.dumps({**fields, SEAL: _digest(fields, payload)}).encode()
 
         def write(stream: BinaryIO) -> None:
             stream.write(_MAGIC + line + b"\n")
@@ -105,20 +116,34 @@ class CheckpointFolder:
         if not files:
             raise CheckpointError(
                 f"nothing to resume: no checkpoint in {self.folder}. Check the folder, or start the search without "
-                "resume (resume='auto' does whichever is possible)."
+                "resume (resume='auto' does whichever is possible; what is left of a search there is only replaced "
+                "with overwrite=True)."
             )
-        damage = []
-        for path in reversed(files):
+        path, header, payload, damage = self._newest()
+        _refuse_other_versions(path, header.versions, versions)
+        refuse_other_settings(path.parent.parent, header.settings, settings)
+        if damage:
+            warnings.warn(f"damaged checkpoint passed over ({'; '.join(damage)}); resuming from {path.name}")
+        return self._unpickled(path, payload)
+
+    def settings(self) -> dict[str, Any] | None:
+        """Settings of the search that the newest whole checkpoint is of; None where there is no checkpoint.
+
+        Raises:
+            CheckpointError: All are damaged.
+        """
+        return self._newest()[1].settings if self else None
+
+    def _newest(self) -> tuple[Path, Header, bytes, list[str]]:
+        """The newest checkpoint that is whole, and what is wrong with newer ones."""
+        damage: list[str] = []
+        for path in reversed(self._files()):
             try:
-                header, payload = _read(path)
+                return path, *_read(path), damage
+            except _OtherFormat as error:
+                damage.append(str(error))
             except _Damaged as error:
                 damage.append(f"{path.name}: {error}")
-                continue
-            _refuse_other_versions(path, header.versions, versions)
-            _refuse_other_settings(path, header.settings, settings)
-            if damage:
-                warnings.warn(f"damaged checkpoint passed over ({'; '.join(damage)}); resuming from {path.name}")
-            return self._unpickled(path, payload)
         raise CheckpointError(
             f"no checkpoint in {self.folder} can be read ({'; '.join(damage)}). What the run had found by then is in "
             "archive.npz beside it; to search again, use another folder or overwrite=True."
@@ -164,6 +189,10 @@ class _Damaged(Exception):
     """A checkpoint file is damaged."""
 
 
+class _OtherFormat(_Damaged):
+    """A checkpoint file says that it has a format that is not known here."""
+
+
 def _read(path: Path) -> tuple[Header, bytes]:
     try:
         content = path.read_bytes()
@@ -174,18 +203,25 @@ def _read(path: Path) -> tuple[Header, bytes]:
     line, _, payload = content[len(_MAGIC) :].partition(b"\n")
     try:
         fields = json.loads(line)
-        schema, size, digest = fields["schema"], fields["bytes"], fields["sha256"]
-        header = Header(fields["settings"], fields["versions"], fields["iteration"])
-    except (ValueError, KeyError, TypeError) as error:
+        schema, size, digest = fields["schema"], fields["bytes"], fields.pop(SEAL)
+        header = Header(dict(fields["settings"]), dict(fields["versions"]), fields["iteration"])
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise _Damaged("unreadable header") from error
-    if schema != SCHEMA:
-        raise CheckpointError(
-            f"{path} has checkpoint format {schema}, this version reads {SCHEMA}: resume with the version of "
-            f"legible-envs that wrote it ({header.versions.get('legible-envs', 'unknown')}), or start anew."
+    if schema not in (SCHEMA, _UNSEALED_HEADER):
+        raise _OtherFormat(
+            f"{path} has checkpoint format {shown(schema)}, this version reads {SCHEMA}: resume with the version of "
+            f"legible-envs that wrote it ({header.versions.get('legible-envs', 'unknown')}), or start anew"
         )
-    if len(payload) != size or hashlib.sha256(payload).hexdigest() != digest:
+    if len(payload) != size:
         raise _Damaged(f"truncated or changed ({len(payload)} of {size} bytes)")
+    if digest != (_digest(fields, payload) if schema == SCHEMA else hashlib.sha256(payload).hexdigest()):
+        raise _Damaged("changed since it was written: it does not fit its digest")
     return header, payload
+
+
+def _digest(fields: Mapping[str, Any], payload: bytes) -> str:
+    """Of a whole checkpoint: what its header says, and the pickle."""
+    return hashlib.sha256(digest_of_json(fields).encode("ascii") + payload).hexdigest()
 
 
 def _refuse_other_versions(path: Path, theirs: Mapping[str, str], ours: Mapping[str, str]) -> None:
@@ -198,14 +234,24 @@ def _refuse_other_versions(path: Path, theirs: Mapping[str, str], ours: Mapping[
             )
 
 
-def _refuse_other_settings(path: Path, theirs: Mapping[str, Any], ours: Mapping[str, Any]) -> None:
+def refuse_other_settings(folder: Path, theirs: Mapping[str, Any], ours: Mapping[str, Any]) -> None:
+    """Refuse to continue a search with settings that are not its own; only evaluations may have grown.
+
+    Args:
+        folder: Of the run.
+        theirs: Settings of the search that lies there.
+        ours: Settings of the search that wants to continue it.
+
+    Raises:
+        CheckpointError: They differ; the message names the first setting that does, before and now.
+    """
     for name in sorted({*theirs, *ours}):
         before, now = theirs.get(name), ours.get(name)
         grown = name == "evaluations" and isinstance(before, int) and isinstance(now, int) and now > before
         if before != now and not grown:
             where, before, now = _first_difference(name, before, now)
             raise CheckpointError(
-                f"cannot resume {path.parent.parent}: {where} was {before!r}, now it is {now!r}. Resume with the same "
+                f"cannot resume {folder}: {where} was {before!r}, now it is {now!r}. Resume with the same "
                 "settings (only evaluations may grow), or start anew in another folder."
             )
 

@@ -9,6 +9,12 @@
 =============== ======================================================================================================
 
 Every file is replaced in one step, so a run that is killed leaves whole files; ``metrics.csv`` alone is appended to.
+The manifest is the first file that is written, and what makes a folder the folder of a run: whenever a search is
+killed, its folder holds no run, one that has only begun (a manifest and no checkpoint), or one that can be continued.
+The first file that an overwritten run loses is its manifest, so that it is there whole or not at all.
+
+The manifest carries its own digest; that of a finished run also names those of archive and metrics
+(:mod:`legible_envs.support.digests`).
 """
 
 from __future__ import annotations
@@ -16,6 +22,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import os
 import platform
 import subprocess
 import sys
@@ -25,8 +32,12 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from legible_envs.support.files import remove_leftovers, write_text
-from optimizers.errors import SearchError
+from legible_envs.support.digests import sealed
+from legible_envs.support.files import is_leftover, remove_leftovers, write_text
+from legible_envs.support.text import read_text
+from optimizers.errors import CheckpointError, SearchError
+from optimizers.runs.checkpoint import CheckpointFolder
+from optimizers.runs.manifest import SCHEMA, manifest_from
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -44,8 +55,6 @@ COLUMNS = (
     "elites",
     "evaluations_per_second",
 )
-SCHEMA = 1
-_NEEDED = ("schema", "workspace", "objective", "archive")
 _MAY_BE_EMPTY = ("best",)
 _COUNTS = ("iteration", "evaluations", "elites")
 _REALS = tuple(name for name in COLUMNS if name not in (*_COUNTS, "phase"))
@@ -67,15 +76,38 @@ class RunFolder:
         self.path = path
         self.checkpoints = path / "checkpoint"
         self.archive = path / "archive.npz"
-        self._config = path / "config.json"
-        self._metrics = path / "metrics.csv"
+        self.config = path / "config.json"
+        self.metrics = path / "metrics.csv"
         self._best = path / "best.txt"
         self._best_json = path / "best.json"
+        self._replaced = path / ".config.json.replaced"
 
     @property
     def holds_a_run(self) -> bool:
-        """Whether something of a run lies there."""
-        return self._config.exists() or self.archive.exists() or any(self.checkpoints.glob("*.checkpoint"))
+        """Whether something of a run lies there; what is left of one that was being overwritten does not count."""
+        if self.config.exists():
+            return True
+        return not self._replaced.exists() and (self.archive.exists() or self._has_checkpoints)
+
+    @property
+    def has_only_begun(self) -> bool:
+        """Whether the search there was stopped before its first checkpoint: nothing is known but its settings."""
+        return self.config.exists() and not self.archive.exists() and not self._has_checkpoints
+
+    def others(self) -> list[str]:
+        """Names of what lies there and is no run, nor what is left of one that was killed or being overwritten."""
+        if self.holds_a_run or self._replaced.exists() or not self.path.is_dir():
+            return []
+        return sorted(file.name for file in self.path.iterdir() if not is_leftover(file) and file != self.checkpoints)
+
+    @property
+    def has_saved(self) -> bool:
+        """Whether the search there has saved layouts that :func:`optimizers.load_run` can read."""
+        return is_run_folder(self.path) and self.archive.is_file()
+
+    @property
+    def _has_checkpoints(self) -> bool:
+        return any(self.checkpoints.glob("*.checkpoint"))
 
     def create(self, *, overwrite: bool) -> None:
         """Make the folder ready for a new run.
@@ -83,43 +115,67 @@ class RunFolder:
         Raises:
             SearchError: It holds a run already and ``overwrite`` is False.
         """
-        if self.holds_a_run:
-            if not overwrite:
-                raise SearchError(
-                    f"{self.path} already holds a run: continue it with resume=True, choose another folder, or pass "
-                    "overwrite=True to replace it"
-                )
-            best = (self._best, self._best_json)
-            for file in (self._config, self._metrics, self.archive, *best, *self.checkpoints.glob("*.checkpoint")):
-                file.unlink(missing_ok=True)
+        if self.holds_a_run and not overwrite:
+            raise SearchError(
+                f"{self.path} already holds a run: continue it with resume=True, choose another folder, or pass "
+                "overwrite=True to replace it"
+            )
+        self.discard()
         self.path.mkdir(parents=True, exist_ok=True)
         remove_leftovers(self.path)
 
-    def read_config(self) -> dict[str, Any]:
-        """The manifest.
+    def discard(self) -> None:
+        """Remove the run that lies there, or what is left of one whose removal was interrupted.
+
+        The manifest gets another name first, in one step: before it the run is whole, from then on it is none.
+        """
+        if not (self.holds_a_run or self._replaced.exists()):
+            return
+        if self.config.exists():
+            os.replace(self.config, self._replaced)
+        elif not self._replaced.exists():
+            write_text(self._replaced, "")
+        for file in (self.metrics, self.archive, self._best, self._best_json, *self.checkpoints.glob("*.checkpoint")):
+            file.unlink(missing_ok=True)
+        self._replaced.unlink(missing_ok=True)
+
+    def settings(self) -> dict[str, Any]:
+        """Settings of the search that lies there: of its manifest, or of its newest checkpoint where that is lost.
+
+        Keys are those of the manifest: ``workspace``, ``objective``, ``emitter``, ``seed``, ...
 
         Raises:
-            SearchError: There is none, it is damaged, or this version does not read it.
+            SearchError: Neither can be read.
         """
         try:
-            config = json.loads(self._config.read_text(encoding="utf-8"))
+            return self.read_config()
+        except SearchError as error:
+            try:
+                found = CheckpointFolder(self.checkpoints, {}).settings()
+            except CheckpointError:
+                found = None
+            if found is None:
+                raise error from None
+            return found
+
+    def read_config(self) -> dict[str, Any]:
+        """The manifest, without its own digest.
+
+        Raises:
+            SearchError: There is none, it is damaged, or this version does not read it; names file and key.
+        """
+        try:
+            text = read_text(self.config)
         except FileNotFoundError as error:
             raise SearchError(f"{self.path} is not the folder of a search: it has no config.json") from error
         except ValueError as error:
-            raise SearchError(f"{self._config} is not valid JSON: {error}") from error
-        if not isinstance(config, dict):
-            raise SearchError(f"{self._config} is not the manifest of a search: it holds a {type(config).__name__}")
-        missing = [key for key in _NEEDED if key not in config]
-        if missing:
-            raise SearchError(f"{self._config} is not the manifest of a search: it lacks {missing}")
-        if config["schema"] != SCHEMA:
-            raise SearchError(f"{self._config} has schema {config['schema']!r}, this version reads schema {SCHEMA}")
-        return config
+            raise SearchError(str(error)) from error
+        return manifest_from(text, str(self.config))
 
     def write_config(self, config: Mapping[str, Any]) -> None:
-        """Write the manifest."""
-        text = json.dumps({"schema": SCHEMA, **config}, indent=2) + "\n"
-        write_text(self._config, text)
+        """Write the manifest, with its digest."""
+        text = json.dumps(sealed({"schema": SCHEMA} | dict(config) | {"schema": SCHEMA}), indent=2) + "\n"
+        write_text(self.config, text)
 
     def write_best(self, layout: object) -> None:
         """Write the best layout: as JSON where it can say itself so, else as its drawing."""
@@ -131,11 +187,11 @@ class RunFolder:
     def rewrite_metrics(self, rows: Iterable[Mapping[str, Any]]) -> None:
         """Write ``metrics.csv`` with exactly these rows."""
         text = ",".join(COLUMNS) + "\n" + _as_csv(rows)
-        write_text(self._metrics, text)
+        write_text(self.metrics, text)
 
     def append_metrics(self, row: Mapping[str, Any]) -> None:
         """Add one row to ``metrics.csv``."""
-        with self._metrics.open("a", encoding="utf-8", newline="") as stream:
+        with self.metrics.open("a", encoding="utf-8", newline="") as stream:
             stream.write(_as_csv([row]))
 
     def read_metrics(self) -> pd.DataFrame:
@@ -149,12 +205,12 @@ class RunFolder:
         import pandas as pd
 
         try:
-            text = self._metrics.read_text(encoding="utf-8")
+            text = self.metrics.read_text(encoding="utf-8")
             whole_lines = text[: text.rfind("\n") + 1]
             table = pd.read_csv(io.StringIO(whole_lines), dtype=str, keep_default_na=False)
             missing = [name for name in COLUMNS if name not in table]
             if missing:
-                raise SearchError(f"{self._metrics} is damaged: it lacks the columns {missing}")
+                raise SearchError(f"{self.metrics} is damaged: it lacks the columns {missing}")
             # An absent field reads as an empty one.
             needed = table[[name for name in COLUMNS if name not in _MAY_BE_EMPTY]]
             whole = table.loc[(needed != "").all(axis=1), list(COLUMNS)]
@@ -165,18 +221,22 @@ class RunFolder:
         except (FileNotFoundError, pd.errors.EmptyDataError):
             return pd.DataFrame(columns=list(COLUMNS))
         except ValueError as error:
-            raise SearchError(f"{self._metrics} is damaged: {error}") from error
+            raise SearchError(f"{self.metrics} is damaged: {error}") from error
 
 
 def package_versions() -> dict[str, str]:
     """Versions of what a run's numbers come from."""
-    found = {"python": platform.python_version()}
-    for package in ("legible-envs", "ribs", "numpy", "numba", "gymnasium"):
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            found[package] = "unknown"
-    return found
+    packages = ("legible-envs", "ribs", "numpy", "numba", "gymnasium")
+    return {"python": platform.python_version(), **{package: _version(package) for package in packages}}
+
+
+@cache
+def _version(package: str) -> str:
+    """Looked up once per process: it takes 9 ms, and every checkpoint names the versions."""
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "unknown"
 
 
 def pickle_versions() -> dict[str, str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,11 +14,15 @@ from legible_envs.workspace import Workspace, make_workspace
 from optimizers.archives import WorkspaceArchive, archive_arrays, make_archive, read_archive
 from optimizers.errors import SearchError
 from optimizers.runs.folder import COLUMNS, RunFolder
+from optimizers.runs.manifest import digests_of
 
 if TYPE_CHECKING:
     import pandas as pd
 
 __all__ = ["Elites", "SearchResult", "load_run"]
+
+_READINGS = 5
+"""How often a run is read again that changes while it is read."""
 
 
 @dataclass(frozen=True)
@@ -132,26 +137,39 @@ def load_run(folder: str | Path, workspace: Workspace | None = None) -> SearchRe
         The result; its archive holds the same elites.
 
     Raises:
-        SearchError: The folder holds no run, or one of its files is damaged; the message names the file.
-        ValueError: The workspace of the run is not known here.
+        SearchError: The folder holds no run, or one of its files is damaged or was changed; the message names the file
+            and, in the manifest, the key.
+        ValueError: The workspace of the run is not known here, or does not take its settings.
     """
     run = RunFolder(Path(folder))
     if not run.path.is_dir():
         raise SearchError(f"{folder} is not a folder; expected the folder of a search")
-    config = run.read_config()
+    for _ in range(_READINGS):
+        config = run.read_config()
+        try:
+            return _read_run(run, config, workspace)
+        except SearchError:
+            # A search that went on meanwhile has written files that the manifest read before does not know.
+            if run.read_config() == config:
+                raise
+    raise SearchError(f"{run.path} cannot be read: the search there changes it all the time")
+
+
+def _read_run(run: RunFolder, config: dict[str, Any], workspace: Workspace | None) -> SearchResult:
     if workspace is None:
-        workspace = make_workspace(config["workspace"])
+        workspace = _workspace_of(run, config)
     archive = _read_archive(run, workspace, config)
     history = _rows(run.read_metrics())
+    _check_digests(run, config, archive, history)
     last = history[-1] if history else {"evaluations": 0, "iteration": 0, "seconds": 0.0}
     finished = config.get("result") or {}
-    genome, objective = finished.get("best_genome"), finished.get("best_objective")
+    genome, objective = _best_genome(run, finished, workspace), finished.get("best_objective")
     if genome is None and archive.best_elite is not None:
         genome, objective = archive.best_elite["solution"], float(archive.best_elite["objective"])
     return SearchResult(
         workspace=workspace,
         archive=archive,
-        best_genome=None if genome is None else np.asarray(genome, dtype=workspace.genome_dtype),
+        best_genome=genome,
         best_objective=objective,
         history=history,
         evaluations=int(finished.get("evaluations", last["evaluations"])),
@@ -164,16 +182,57 @@ def load_run(folder: str | Path, workspace: Workspace | None = None) -> SearchRe
     )
 
 
+def _workspace_of(run: RunFolder, config: Mapping[str, Any]) -> Workspace:
+    """The workspace that a manifest describes.
+
+    Raises:
+        ValueError: It cannot be made; names the file.
+    """
+    try:
+        return make_workspace(config["workspace"])
+    except (ValueError, TypeError) as error:
+        raise ValueError(f"{run.config}, `workspace`: {error}") from error
+
+
+def _best_genome(run: RunFolder, result: Mapping[str, Any], workspace: Workspace) -> npt.NDArray[Any] | None:
+    """The genome of a result, in the type of the workspace; None where there is none.
+
+    Raises:
+        SearchError: The numbers are no genome of the workspace.
+    """
+    values = result.get("best_genome")
+    if values is None:
+        return None
+    given = np.asarray(values, dtype=np.float64)
+    if given.shape != (workspace.genome_size,):
+        raise SearchError(
+            f"{run.config}: `result.best_genome` must have {workspace.genome_size} numbers, got {given.size}"
+        )
+    whole = np.issubdtype(workspace.genome_dtype, np.integer)
+    wrong = (given < workspace.lower_bounds) | (given > workspace.upper_bounds) | (whole & (given != np.rint(given)))
+    if wrong.any():
+        gene = int(np.argmax(wrong))
+        low, high = workspace.lower_bounds[gene], workspace.upper_bounds[gene]
+        raise SearchError(
+            f"{run.config}: `result.best_genome[{gene}]` must be {'an integer' if whole else 'a number'} from {low} to "
+            f"{high}, got {values[gene]}"
+        )
+    return np.asarray(values, dtype=workspace.genome_dtype)
+
+
 def _read_archive(run: RunFolder, workspace: Workspace, config: dict[str, Any]) -> WorkspaceArchive:
     """The archive as the run's manifest describes it, with the elites of its file."""
     shape = config["archive"]
-    archive = make_archive(
-        workspace,
-        seed=config.get("seed"),
-        dims=shape["dims"],
-        ranges=[tuple(ends) for ends in shape["ranges"]],
-        score_floor=shape["score_floor"],
-    )
+    try:
+        archive = make_archive(
+            workspace,
+            seed=config.get("seed"),
+            dims=shape["dims"],
+            ranges=[tuple(ends) for ends in shape["ranges"]],
+            score_floor=shape["score_floor"],
+        )
+    except ValueError as error:
+        raise SearchError(f"{run.config}, `archive`: {error}") from error
     try:
         arrays = read_archive(run.archive)
     except FileNotFoundError as error:
@@ -184,9 +243,28 @@ def _read_archive(run: RunFolder, workspace: Workspace, config: dict[str, Any]) 
     if len(arrays["objective"]):
         try:
             archive.add(arrays["solution"], arrays["objective"], arrays["measures"])
-        except ValueError as error:
+        except (ValueError, TypeError, IndexError) as error:
             raise SearchError(f"{run.archive} does not fit the manifest beside it: {error}") from error
     return archive
+
+
+def _check_digests(
+    run: RunFolder, config: Mapping[str, Any], archive: WorkspaceArchive, history: list[dict[str, Any]]
+) -> None:
+    """Refuse files that are not those that a finished search left.
+
+    Raises:
+        SearchError: One is not; names it.
+    """
+    known = config.get("digests") or {}
+    found = digests_of(archive_arrays(archive), history) if known else {}
+    for name, file in (("archive", run.archive), ("metrics", run.metrics)):
+        if known and known[name] != found[name]:
+            raise SearchError(
+                f"{file} is not what the search left there: its content has the SHA-256 {found[name][:12]}…, the "
+                f"manifest names {known[name][:12]}…. It was changed since, or damaged: restore it; a search "
+                "with a checkpoint writes it anew when resumed"
+            )
 
 
 def _rows(table: pd.DataFrame) -> list[dict[str, Any]]:

@@ -191,6 +191,24 @@ def test_resume_takes_the_runs_own_settings_and_can_go_further(tmp_path: Path) -
     assert "seed" in refused.output
 
 
+def test_resume_begins_a_search_where_there_is_none_and_says_so(tmp_path: Path) -> None:
+    out, small = tmp_path / "run", ("--shape", 5, 5, "--evaluations", 1200, "--quiet", "--resume")
+    result = legible("optimize", "overcooked", *small, "--out", out)
+    assert result.exit_code == 0, result.output
+    assert f"there is no search in {out} to go on with: one begins" in result.output
+    for path in (out / "archive.npz", *(out / "checkpoint").iterdir()):
+        path.unlink()
+    begun = legible("optimize", "overcooked", "--resume", "--quiet", "--out", out)
+    assert begun.exit_code == 0, begun.output
+    assert "stopped before its first checkpoint; it begins anew with the same settings" in begun.output
+    assert json.loads((out / "config.json").read_text())["evaluations"] == 1200
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "thesis.tex").touch()
+    refused = legible("optimize", "overcooked", *small, "--out", tmp_path / "other")
+    assert refused.exit_code == 2
+    assert "holds other files (thesis.tex)" in refused.output
+
+
 def test_efficiency_and_a_distance_cap(tmp_path: Path) -> None:
     small = ("--shape", 5, 5, "--evaluations", 3000, "--quiet", "--objective", "legible-efficient")
     capped = legible("optimize", "overcooked", "--out", tmp_path / "a", *small, "--max-distance", 60)
@@ -321,7 +339,6 @@ def test_emitters_are_listed() -> None:
         (("optimize", "overcooked", "--emitter", "json:nobody"), None, "nobody"),
         (("optimize", "overcooked", "--prefix", "most"), None, "most"),
         (("optimize", "overcooked", "--max-distance", "-3"), None, "--max-distance"),
-        (("optimize", "overcooked", "--resume", "--out", "nowhere"), None, "nowhere"),
         (("optimize", "kitchenette"), None, "kitchenette"),
         (("report", "."), None, "config.json"),
         (("humans", "fetch", "--from", "not-the-archive"), None, "not-the-archive"),
@@ -446,14 +463,19 @@ def test_files_of_a_reading_cannot_run_anything(run: Path, walks_of_run: Path, t
     from benchmarks.reports.prediction_report import evaluation_section
 
     (out / "accuracy.svg").write_text("<svg><script>alert(1)</script></svg>")
-    text = (out / "reading.json").read_text().replace('"notes": []', '"notes": ["<script>alert(1)</script>"]')
-    (out / "reading.json").write_text(text)
+    with pytest.warns(UserWarning, match=r"accuracy\.svg beside it was changed since it was written"):
+        assert evaluation_section(out) is None
+    about = json.loads((out / "reading.json").read_text())
+    assert about.pop("sha256")
+    about |= {"schema": 1, "notes": ["<script>alert(1)</script>"]}  # files of earlier versions have no digests
+    (out / "reading.json").write_text(json.dumps(about))
     section = evaluation_section(out)
     assert section is not None
     assert "&lt;script&gt;" in section
     assert "<script" not in section
     (out / "reading.json").write_text("{")
-    assert evaluation_section(out) is None
+    with pytest.warns(UserWarning, match=r"reading\.json: not valid JSON.*evaluate again"):
+        assert evaluation_section(out) is None
 
 
 @pytest.mark.parametrize(

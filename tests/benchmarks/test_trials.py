@@ -10,12 +10,14 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from benchmarks.trials import Event, TrialName, TrialsFailed, TrialStore, run_trials
+from benchmarks.trials.store import plain
 from legible_envs.overcooked import OvercookedWorkspace
 from optimizers import search
 from optimizers.cluster import connect
@@ -74,6 +76,69 @@ def test_a_damaged_result_is_computed_again(tmp_path: Path) -> None:
     after = run_trials(trial_functions.draw_and_count, trials, tmp_path, workers=1)
     pd.testing.assert_frame_equal(before, after)
     assert len(marks_of(tmp_path)) == 3
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"rows": [1]}, "`rows[0]` must be a mapping, got 1"),
+        ({"rows": [{"value": [1]}]}, "a value of `rows` must be a text, a number or null, got [1]"),
+        ({"rows": [{"value": 0.5}]}, "was changed since"),
+        ({"schema": 3}, "it has schema 3, this version reads schema 2"),
+        ({"sha256": None}, "was changed since"),
+        ({"cell": {"seed": 9}, "schema": 1}, "the unknown key 'sha256'"),
+        ([], "it lacks `schema`"),
+    ],
+)
+def test_a_result_that_is_not_what_was_kept_is_named_and_run_again(tmp_path: Path, change: Any, said: str) -> None:
+    trials, events = with_marks(tmp_path, 2), list[Event]()
+    before = run_trials(trial_functions.draw_and_count, trials, tmp_path, workers=1)
+    victim = sorted((tmp_path / "cells").glob("*.json"))[0]
+    victim.write_text(json.dumps({**json.loads(victim.read_text()), **change} if change else change))
+    with pytest.warns(UserWarning, match="1 kept file of trials cannot be used") as warned:
+        after = run_trials(trial_functions.draw_and_count, trials, tmp_path, workers=1, progress=events.append)
+    (line,) = events[0].damaged
+    assert said in line
+    assert line.startswith(str(victim))
+    assert line in str(warned[0].message)
+    pd.testing.assert_frame_equal(before, after)
+    assert len(marks_of(tmp_path)) == 3
+    assert victim.with_name(f"{victim.name}.damaged").exists()
+
+
+def test_a_result_of_another_trial_does_not_count(tmp_path: Path) -> None:
+    trials = with_marks(tmp_path, 2)
+    before = run_trials(trial_functions.draw_and_count, trials, tmp_path, workers=1)
+    one, other = sorted((tmp_path / "cells").glob("*.json"))
+    one.write_text(other.read_text())
+    with pytest.warns(UserWarning, match="it holds another trial than its name says"):
+        pd.testing.assert_frame_equal(before, run_trials(trial_functions.draw_and_count, trials, tmp_path, workers=1))
+
+
+def test_a_damaged_traceback_stops_nothing(tmp_path: Path) -> None:
+    trials = with_marks(tmp_path)
+    with pytest.raises(TrialsFailed):
+        run_trials(trial_functions.always_fail_at_two, trials, tmp_path, workers=1)
+    (victim,) = (tmp_path / "failed").glob("*.json")
+    victim.write_text(victim.read_text()[:99])
+    with pytest.warns(UserWarning, match=victim.name), pytest.raises(TrialsFailed, match="two is not allowed"):
+        run_trials(trial_functions.always_fail_at_two, trials, tmp_path, workers=1)
+
+
+def test_results_of_earlier_versions_are_read(tmp_path: Path) -> None:
+    trials = with_marks(tmp_path, 2)
+    before = run_trials(trial_functions.draw_and_count, trials, tmp_path, workers=1)
+    for path in (tmp_path / "cells").glob("*.json"):
+        content = {key: value for key, value in json.loads(path.read_text()).items() if key != "sha256"}
+        path.write_text(json.dumps({**content, "schema": 1}))
+    pd.testing.assert_frame_equal(before, run_trials(trial_functions.draw_and_count, trials, tmp_path, workers=1))
+    assert len(marks_of(tmp_path)) == 2
+
+
+@pytest.mark.parametrize("value", ["\ud800", 2**200])
+def test_what_could_not_be_read_back_is_not_kept(value: Any) -> None:
+    with pytest.raises(ValueError, match="result row"):
+        plain({"value": value})
 
 
 def test_a_failed_cell_is_retried_once_and_its_traceback_kept(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ import pytest
 
 import optimizers
 from legible_envs.overcooked import OvercookedLayout, OvercookedWorkspace
+from legible_envs.support.digests import sealed
 from optimizers import EmitterError, SearchError, load_run, make_archive, search
 from optimizers.archives import archive_arrays, read_archive
 from tests.support.shelf_workspace import ShelfWorkspace
@@ -260,8 +261,8 @@ def test_a_run_folder_holds_manifest_metrics_archive_and_drawing(tmp_path, same_
     assert {p.name for p in folder.iterdir()} == {"config.json", "metrics.csv", "archive.npz", "best.txt", "checkpoint"}
 
     config = json.loads((folder / "config.json").read_text())
-    assert config == result.config
-    assert config["schema"] == 1
+    assert config == sealed(result.config)
+    assert config["schema"] == 2
     assert config["workspace"] == workspace.to_config()
     assert config["objective"] == {"name": "legibility", "max_distance": 400.0}
     assert config["emitter"]["name"] == "improve"

@@ -64,7 +64,27 @@ def test_a_line_that_was_cut_off_is_left_out(tmp_path: Path, workspace: Overcook
         (lambda f: (f / "config.json").write_text("{"), "not valid JSON"),
         (lambda f: (f / "config.json").write_text("[1]"), "holds a list"),
         (lambda f: (f / "config.json").write_text("{}"), "lacks"),
-        (lambda f: edit_config(f, schema=2), "has schema 2, this version reads schema 1"),
+        (
+            lambda f: edit_config(f, archive={"dims": [10**9] * 2}),
+            r"config.json: `archive.dims` must make an",
+        ),
+        (
+            lambda f: edit_config(f, objective={"name": 3}),
+            r"config.json: `objective.name` must be a non-empty",
+        ),
+        (lambda f: edit_config(f, seed=-1), r"`seed` must be an integer >= 0, got -1"),
+        (lambda f: edit_config(f, sead=1), r"has the unknown key 'sead' \(did you mean `seed`\?\)"),
+        (lambda f: edit_config(f, emitter=[{}]), r"`emitter\[0\]` lacks the key `name`"),
+        (
+            lambda f: edit_config(f, result={"best_genome": [0] * 3}),
+            r"`result.best_genome` must have 32 numbers",
+        ),
+        (
+            lambda f: edit_config(f, result={"best_genome": [99] * 32}),
+            r"`result.best_genome\[0\]` must be an integer",
+        ),
+        (lambda f: edit_config(f, schema=2), "it lacks `sha256`, the digest of its content"),
+        (lambda f: edit_config(f, schema=3), "has schema 3, this version reads schema 2"),
         (lambda f: (f / "archive.npz").unlink(), "no archive.npz"),
         (lambda f: (f / "archive.npz").write_bytes(b"PK\x03\x04 no"), "damaged"),
         (lambda f: (f / "archive.npz").write_bytes((f / "archive.npz").read_bytes()[:500]), "damaged"),
