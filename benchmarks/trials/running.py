@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -125,25 +126,30 @@ def _run(
     report: Callable[[Event], object],
 ) -> None:
     attempts: dict[int, int] = {}
-    for news in pool.run(function, iter(waiting)):
-        if not isinstance(news, Outcome):
-            event.running = news
-            report(event)
-            continue
-        trial = trials[news.number]
-        event.last = news
-        if news.rows is not None:
-            store.save(trial, news.rows, news.seconds, news.worker)
-            event.done += 1
-        else:
-            attempts[news.number] = attempts.get(news.number, 0) + 1
-            store.save_failure(trial, news.error or "", attempts[news.number], news.worker)
-            if attempts[news.number] < ATTEMPTS:
-                event.retried += 1
-                pool.again(news.number, trial)
+    # Closed even where the loop ends by an error or Ctrl-C: its workers end with it, not with the garbage.
+    with contextlib.closing(pool.run(function, iter(waiting))) as running:
+        for news in running:
+            if isinstance(news, Outcome):
+                _note(news, trials[news.number], attempts, pool, store, event)
             else:
-                event.failed += 1
-        report(event)
+                event.running = news
+            report(event)
+
+
+def _note(outcome: Outcome, trial: Trial, attempts: dict[int, int], pool: Pool, store: TrialStore, event: Event) -> None:
+    """Keep a result; have a failed trial run once more."""
+    event.last = outcome
+    if outcome.rows is not None:
+        store.save(trial, outcome.rows, outcome.seconds, outcome.worker)
+        event.done += 1
+        return
+    attempts[outcome.number] = attempts.get(outcome.number, 0) + 1
+    store.save_failure(trial, outcome.error or "", attempts[outcome.number], outcome.worker)
+    if attempts[outcome.number] < ATTEMPTS:
+        event.retried += 1
+        pool.again(outcome.number, trial)
+    else:
+        event.failed += 1
 
 
 def _pool(workers: int | None, scheduler: str | None, num_trials: int) -> Pool:
