@@ -131,7 +131,9 @@ class _Worker:
 
     def outcome(self) -> Outcome:
         """How its trial ended; to be asked once one of the ``signs`` is ready."""
-        assert self.job is not None and self.process is not None and self.pipe is not None
+        assert self.job is not None
+        assert self.process is not None
+        assert self.pipe is not None
         number, self.job = self.job[0], None
         try:
             if self.pipe.poll():

@@ -12,12 +12,13 @@ from benchmarks.console import plural
 from benchmarks.trials.attempts import Outcome, Pool
 from benchmarks.trials.functions import name_of, path_of
 from benchmarks.trials.store import Trial, TrialStore
-from legible_envs.support.validation import integer
+from legible_envs.support.validation import integer, real
+from optimizers.errors import ClusterError
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Event", "TrialsFailed", "run_trials"]
+__all__ = ["Event", "TrialsFailed", "TrialsStopped", "run_trials"]
 
 ATTEMPTS: Final = 2
 
@@ -59,6 +60,10 @@ class TrialsFailed(RuntimeError):
         self.table = table
 
 
+class TrialsStopped(ClusterError):
+    """The cluster was lost, or had no worker that may be used; finished trials are on disk, the others were not run."""
+
+
 def run_trials(
     function: Callable[[dict[str, Any]], Any] | str,
     trials: Iterable[Trial],
@@ -66,6 +71,7 @@ def run_trials(
     *,
     workers: int | None = None,
     scheduler: str | None = None,
+    worker_timeout: float = 60.0,
     progress: Callable[[Event], object] | None = None,
 ) -> pd.DataFrame:
     """Run a function over trials and keep every result.
@@ -82,8 +88,10 @@ def run_trials(
             unless it was given one.
         workers: Processes on this machine; all cores if None; 1 runs everything in this process. A script of your own
             that starts several needs the usual ``if __name__ == "__main__":``.
-        scheduler: Address of a Dask scheduler, such as ``"tcp://10.0.0.1:8786"``, whose workers can import
-            ``function``; wins over ``workers``.
+        scheduler: Address of a Dask scheduler, such as ``"tcp://10.0.0.1:8786"``, whose workers have the same code as
+            this process, that of ``function`` included; wins over ``workers``. Workers with other code are named in a
+            warning and not used.
+        worker_timeout: Seconds to wait for a worker of the cluster where it has none that may be used.
         progress: Called with an :class:`Event` whenever something changes.
 
     Returns:
@@ -91,6 +99,8 @@ def run_trials(
 
     Raises:
         TrialsFailed: Some trials failed twice. Raised at the end, when all others are finished.
+        TrialsStopped: The scheduler was lost, or no worker came in time; what was finished is on disk.
+        ClusterError: No scheduler answers at that address.
         ValueError: A trial that JSON cannot hold, or a function that workers cannot find.
     """
     path = path_of(function)
@@ -101,7 +111,11 @@ def run_trials(
     report = progress or (lambda event: None)
     report(event)
     if waiting:
-        _run(_pool(workers, scheduler, len(waiting)), path, unique, waiting, store, event, report)
+        pool = _pool(workers, scheduler, worker_timeout, path, waiting)
+        try:
+            _run(pool, path, unique, waiting, store, event, report)
+        except ClusterError as error:
+            raise TrialsStopped(f"{error}. {_kept(event, store)}") from None
     table = store.table(unique)
     keys = {store.key(trial) for trial in unique}
     failures = [failure for failure in store.failures() if store.key(failure["cell"]) in keys]
@@ -114,6 +128,11 @@ def run_trials(
             table,
         )
     return table
+
+
+def _kept(event: Event, store: TrialStore) -> str:
+    count = f"{event.done} of {plural(event.total, 'trial')}"
+    return f"Finished and kept in {store.folder}: {count}; asked again, the others are run, on a cluster or without one"
 
 
 def _run(
@@ -136,7 +155,9 @@ def _run(
             report(event)
 
 
-def _note(outcome: Outcome, trial: Trial, attempts: dict[int, int], pool: Pool, store: TrialStore, event: Event) -> None:
+def _note(
+    outcome: Outcome, trial: Trial, attempts: dict[int, int], pool: Pool, store: TrialStore, event: Event
+) -> None:
     """Keep a result; have a failed trial run once more."""
     event.last = outcome
     if outcome.rows is not None:
@@ -152,12 +173,23 @@ def _note(outcome: Outcome, trial: Trial, attempts: dict[int, int], pool: Pool, 
         event.failed += 1
 
 
-def _pool(workers: int | None, scheduler: str | None, num_trials: int) -> Pool:
+def _pool(
+    workers: int | None,
+    scheduler: str | None,
+    worker_timeout: float,
+    function: str,
+    waiting: Sequence[tuple[int, Trial]],
+) -> Pool:
+    real("worker_timeout", worker_timeout, 0, unit="seconds")
     if scheduler is not None:
         from benchmarks.trials.cluster import ClusterPool
 
-        return ClusterPool(scheduler)
+        module = function.partition(":")[0]
+        if module == "__main__":
+            raise ValueError(f"workers of a cluster cannot import {function!r} from a script; give it a module")
+        packages = ("legible_envs", "optimizers", "predictors", "benchmarks", module.partition(".")[0])
+        return ClusterPool(scheduler, packages, worker_timeout)
     from benchmarks.trials.local import InProcess, LocalPool, num_cores
 
     count = num_cores() if workers is None else integer("workers", workers, 1, also="None")
-    return InProcess() if count == 1 else LocalPool(min(count, num_trials))
+    return InProcess() if count == 1 else LocalPool(min(count, len(waiting)))
