@@ -189,7 +189,7 @@ class ClusterObjective:
                 return scores
         raise ClusterError(
             f"the workers of the scheduler at {self._cluster.scheduler} were lost {_TIMES} times while they scored one "
-            "batch; are they short of memory?"
+            "batch (out of memory?)"
         )
 
     def _scored(self, genomes: npt.NDArray[Any], workers: dict[Process, int]) -> npt.NDArray[np.float64] | None:

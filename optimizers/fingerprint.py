@@ -36,6 +36,9 @@ _SUFFIXES: Final = (".py", ".yaml")
 
 _DIGITS: Final = 12
 
+_CLOCKS: Final = 2.0
+"""Seconds by which the beginning of a process and the time of a file may be off."""
+
 
 class OtherCodeError(RuntimeError):
     """A worker runs other code than the process that gave it work."""
@@ -198,7 +201,7 @@ def _files(package: str) -> Iterator[tuple[str, Path]]:
 
 def _changed_modules(packages: Collection[str]) -> Iterator[str]:
     """Loaded modules of the packages whose files were written after this process began."""
-    began = _began()
+    began = _began() + _CLOCKS
     for name, module in sorted(sys.modules.items()):
         file = getattr(module, "__file__", None)
         if file is None or name.partition(".")[0] not in packages:

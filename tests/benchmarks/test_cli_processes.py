@@ -66,9 +66,15 @@ LONG_COMMANDS = {
 }
 
 
+MOMENTS = [
+    *((command, (4.0,)) for command in LONG_COMMANDS),
+    *((command, (1.0,)) for command in ("optimize", "reproduce")),  # while modules are loaded
+    *((command, (4.0, 0.1)) for command in ("optimize", "sweep")),  # twice
+]
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("delays", [(1.0,), (4.0,), (4.0, 0.1)], ids=str)
-@pytest.mark.parametrize("command", LONG_COMMANDS)
+@pytest.mark.parametrize(("command", "delays"), MOMENTS, ids=str)
 def test_ctrl_c_is_a_sentence_and_exit_code_130(command: str, delays: tuple[float, ...], folder: Path) -> None:
     code, error = _interrupted(folder, LONG_COMMANDS[command], *delays)
     assert code == 130, error
@@ -78,8 +84,7 @@ def test_ctrl_c_is_a_sentence_and_exit_code_130(command: str, delays: tuple[floa
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("delay", [0.3, 0.6, 1.2])
-@pytest.mark.parametrize("command", ["score", "show"])
+@pytest.mark.parametrize(("command", "delay"), [("score", 0.3), ("show", 0.6), ("score", 1.2)])
 def test_ctrl_c_while_a_layout_is_scored(command: str, delay: float, folder: Path) -> None:
     code, error = _interrupted(folder, (command, "k.txt"), delay)
     assert (code, error.strip()) in ((130, "stopped"), (0, "")), "stopped, or done before"
