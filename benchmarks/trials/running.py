@@ -183,12 +183,11 @@ def _pool(
     real("worker_timeout", worker_timeout, 0, unit="seconds")
     if scheduler is not None:
         from benchmarks.trials.cluster import ClusterPool
+        from benchmarks.trials.packages import packages_of
 
-        module = function.partition(":")[0]
-        if module == "__main__":
-            raise ValueError(f"workers of a cluster cannot import {function!r} from a script; give it a module")
-        packages = ("legible_envs", "optimizers", "predictors", "benchmarks", module.partition(".")[0])
-        return ClusterPool(scheduler, packages, worker_timeout)
+        if function.startswith("__main__:"):
+            raise ValueError(f"workers of a cluster cannot import {function!r} from a script; put it into a module")
+        return ClusterPool(scheduler, packages_of(function, (trial for _, trial in waiting)), worker_timeout)
     from benchmarks.trials.local import InProcess, LocalPool, num_cores
 
     count = num_cores() if workers is None else integer("workers", workers, 1, also="None")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -50,10 +51,23 @@ def _interrupted(folder: Path, arguments: tuple[str, ...], *delays: float) -> tu
             os.killpg(process.pid, signal.SIGINT)
     try:
         _, error = process.communicate(timeout=120)
+        assert not _left(process.pid), "it left processes behind"
     finally:
-        if process.poll() is None:
+        with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
     return process.returncode, error
+
+
+def _left(group: int) -> bool:
+    """Whether processes of a group stay for longer than ten seconds."""
+    deadline = time.monotonic() + 10
+    while time.monotonic() < deadline:
+        try:
+            os.killpg(group, 0)
+        except ProcessLookupError:
+            return False
+        time.sleep(0.02)
+    return True
 
 
 LONG_COMMANDS = {

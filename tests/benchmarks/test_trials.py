@@ -13,6 +13,7 @@ import pandas as pd
 import pytest
 
 from benchmarks.trials import Event, TrialName, TrialsFailed, TrialStore, run_trials
+from benchmarks.trials.packages import packages_of
 from legible_envs.overcooked import OvercookedWorkspace
 from optimizers import search
 from optimizers.cluster import connect
@@ -149,6 +150,16 @@ def test_bad_functions_and_cells_are_named(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(FileExistsError, match="is a file"):
         run_trials(trial_functions.draw, TRIALS, tmp_path / "file", workers=1)
+
+
+def test_workers_are_asked_for_the_packages_that_trials_name(aisle_package: Path) -> None:
+    ours = ["benchmarks", "legible_envs", "optimizers", "predictors"]
+    trial = {"workspace": {"workspace": "overcooked"}, "label": "a: b", "time": "json:loads", "gone": "no_such:Thing"}
+    assert packages_of("benchmarks.sweeps.run:run_search", [trial]) == ours
+    theirs = {"workspace": {"workspace": "aisle"}, "emitters": [{"emitter": "tests.support.pointing:Mine"}]}
+    assert packages_of("scipy.stats:norm", [trial, theirs]) == sorted(
+        [*ours, "legible_workspace_example", "scipy", "tests"]
+    )
 
 
 def test_a_missing_scheduler_is_named() -> None:

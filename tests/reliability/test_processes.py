@@ -62,7 +62,8 @@ class Session:
         self._errors = (folder / "errors").open("w")
         environment = {**os.environ, "PYTHONPATH": str(ROOT)}
         self.parent = subprocess.Popen(command, cwd=folder, env=environment, start_new_session=True,
-                                       stdout=subprocess.DEVNULL, stderr=self._errors)  # fmt: skip
+                                       stdout=subprocess.DEVNULL, stderr=self._errors,
+                                       preexec_fn=_hear_of_closed_terminals)  # fmt: skip
 
     def processes(self) -> list[psutil.Process]:
         """Those of the session that are there."""
@@ -106,6 +107,11 @@ class Session:
             with contextlib.suppress(psutil.Error):
                 process.kill()
         self.parent.wait()
+
+
+def _hear_of_closed_terminals() -> None:
+    """Where the tests themselves run under nohup, what they start would ignore them, too."""
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 @pytest.fixture
