@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import pickle
 import socket
 import time
 import warnings
@@ -258,6 +259,11 @@ class Cluster:
             if future.status == "error":
                 with self._speaking():
                     error = future.exception(timeout=_ANSWER)
+                if "deserialization of the task graph" in str(error):
+                    raise ClusterError(
+                        f"the scheduler at {self.scheduler} cannot read what it is sent; start it in an environment "
+                        "with the same packages as the workers"
+                    )
                 raise error.with_traceback(None)
         with self._speaking(), contextlib.suppress(TimeoutError):
             return self.client.sync(
@@ -310,7 +316,8 @@ class Cluster:
         """Ask a worker for its fingerprint, or judge its answer."""
         answer = self._asked.get(process)
         if answer is None or answer.status in ("cancelled", "lost"):
-            self._asked[process] = self.submit(fingerprint_here, list(self.digests), workers=[process])
+            question = pickle.dumps(_Call(fingerprint_here, list(self.digests)))
+            self._asked[process] = self.submit(pickle.loads, question, workers=[process])
             return
         if not answer.done():
             return
@@ -333,11 +340,6 @@ class Cluster:
             error = answer.exception(timeout=_ANSWER)
         except Exception as failure:
             error = failure
-        if "deserialization of the task graph" in str(error):
-            raise ClusterError(
-                f"the scheduler at {self.scheduler} cannot read what it is sent: start it in an environment with this "
-                "package, as the workers"
-            )
         return [f"it cannot say which code it runs ({type(error).__name__}: {error})"], []
 
     def _why_none(self, seconds: float) -> str:
@@ -349,6 +351,20 @@ class Cluster:
         if not reasons:
             return f"no worker joined the scheduler at {self.scheduler} {within}"
         return f"no worker of the scheduler at {self.scheduler} can be used {within}: {'; '.join(reasons)}"
+
+
+class _Call:
+    """What pickles as a call, made where the bytes are read.
+
+    Dask's workers read tasks as they arrive, and end where they cannot. Bytes are read by the task itself: a worker
+    without our packages answers with an error, and stays for others.
+    """
+
+    def __init__(self, function: Callable[..., Any], *arguments: Any) -> None:
+        self._made = (function, arguments)
+
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+        return self._made
 
 
 @contextlib.contextmanager

@@ -18,10 +18,10 @@ from optimizers import ClusterError, SearchResult, search
 from optimizers.searching import SearchState
 from tests.reliability.conftest import Repeats
 from tests.reliability.worker_functions import draw
-from tests.support.clusters import LocalCluster, copy_of_the_packages
+from tests.support.clusters import LocalCluster, copy_of_the_packages, without_the_packages
 from tests.support.shelf_workspace import ShelfWorkspace
 
-pytest.importorskip("distributed")
+Client = pytest.importorskip("distributed").Client
 
 pytestmark = pytest.mark.slow
 
@@ -76,11 +76,18 @@ def test_workers_with_other_code_are_named_and_not_used(cluster: LocalCluster, t
     assert len(used) == 1
     assert table["value"].tolist() == [draw({"seed": seed})["value"] for seed in range(3)]
     cluster.workers[0].kill()
+    lacking = cluster.add_worker(without_the_packages(tmp_path / "lacking"))
+    with Client(cluster.address, set_as_default=False) as client:
+        client.wait_for_workers(2, timeout=60)
     with (
+        pytest.warns(
+            UserWarning, match=r"is not used: it cannot say which code it runs \(ModuleNotFoundError: No module"
+        ),
         pytest.warns(UserWarning, match="is not used: its files of legible_envs are others"),
-        pytest.raises(ClusterError, match=r"no worker of the scheduler at \S+ can be used within 3 s: .* files of leg"),
+        pytest.raises(ClusterError, match=r"no worker of the scheduler at \S+ can be used within 4 s: .* files of leg"),
     ):
-        search(WORKSPACE, evaluations=1000, scheduler=cluster.address, worker_timeout=3)
+        search(WORKSPACE, evaluations=1000, scheduler=cluster.address, worker_timeout=4)
+    assert lacking.poll() is None, "it serves others"
 
 
 def test_a_lost_scheduler_costs_only_what_was_under_way(tmp_path: Path, repeats: Repeats) -> None:

@@ -59,6 +59,13 @@ def _address(where: Path) -> str:
     raise AssertionError("the scheduler did not start")
 
 
+def without_the_packages(folder: Path) -> Path:
+    """Where this project cannot be imported from."""
+    folder.mkdir()
+    (folder / "optimizers.py").write_text("raise ModuleNotFoundError(\"No module named 'optimizers'\")\n")
+    return folder
+
+
 def copy_of_the_packages(folder: Path) -> Path:
     """A copy of this project with one more comment in a file that scores: other code with the same results."""
     for package in ("legible_envs", "optimizers", "predictors", "benchmarks", "tests"):
