@@ -10,7 +10,7 @@ from .emitters.mutation import MutationEmitter
 from .emitters.novelty import NoveltyLocalCompetitionEmitter
 from .emitters.random import RandomWorkspaceEmitter
 from .emitters.registry import list_emitters, make_emitter, register_emitter
-from .errors import CheckpointError, EmitterError, SearchError, SearchInterrupted
+from .errors import CheckpointError, ClusterError, EmitterError, SearchError, SearchInterrupted
 from .evaluator import Evaluator
 from .runs.folder import is_run_folder
 from .runs.result import Elites, SearchResult, load_run
@@ -19,6 +19,7 @@ from .searching import search
 __all__ = [
     "AnnealingEmitter",
     "CheckpointError",
+    "ClusterError",
     "CmaMaeEmitter",
     "CmaMeEmitter",
     "DifferentialEvolutionEmitter",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-__all__ = ["CheckpointError", "EmitterError", "SearchError", "SearchInterrupted"]
+__all__ = ["CheckpointError", "ClusterError", "EmitterError", "SearchError", "SearchInterrupted"]
 
 
 class SearchError(RuntimeError):
@@ -22,6 +22,18 @@ class SearchError(RuntimeError):
 
 class CheckpointError(SearchError):
     """A checkpoint cannot be written, read, or continued with these settings; the message says what to do."""
+
+
+class ClusterError(ConnectionError):
+    """A Dask cluster cannot be reached, has no worker that may be used, or was lost; the message says which.
+
+    Attributes:
+        partial: The :class:`~optimizers.SearchResult` at that moment, where a search was under way; else None.
+    """
+
+    def __init__(self, message: str, *, partial: Any = None) -> None:
+        super().__init__(message)
+        self.partial = partial
 
 
 class SearchInterrupted(KeyboardInterrupt):

@@ -14,7 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.workspace import ObjectiveName, Workspace
-from optimizers.cluster import connect, wait_for_workers
+from optimizers.cluster import WORKERS, Cluster, Process
+from optimizers.errors import ClusterError
+from optimizers.fingerprint import OtherCodeError, expect, package_of
 
 __all__ = ["LEAST", "ClusterObjective", "Evaluator", "Objective"]
 
@@ -22,6 +24,12 @@ Objective = Callable[[npt.NDArray[Any]], npt.NDArray[np.float64]]
 
 LEAST: Final = 256
 """A batch is split only into parts of at least so many genomes: fewer are not worth a message."""
+
+_TIMES: Final = 3
+"""A batch is given to new workers so often where all that had it were lost."""
+
+_LOOK: Final = 0.5
+"""Seconds after which it is looked whether the workers are still there."""
 
 
 class Evaluator:
@@ -34,6 +42,11 @@ class Evaluator:
         max_distance: Layouts whose expected distance over one task execution (floor moves, metres) is greater
             score NaN.
         scheduler: Address of a Dask scheduler whose workers share the scoring; None scores in this process.
+        worker_timeout: Seconds to wait for a worker where the cluster has none that may be used.
+        deadline: ``time.monotonic()`` at which that waiting ends in any case.
+
+    Raises:
+        ClusterError: No scheduler answers, or no worker came in time.
 
     Attributes:
         name: Name of the objective.
@@ -46,6 +59,9 @@ class Evaluator:
         objective: str | Objective = "legibility",
         max_distance: float | None = None,
         scheduler: str | None = None,
+        *,
+        worker_timeout: float = WORKERS,
+        deadline: float | None = None,
     ) -> None:
         self.workspace = workspace
         self.max_distance = max_distance
@@ -61,7 +77,11 @@ class Evaluator:
             self.max_distance = getattr(objective, "max_distance", None) if max_distance is None else max_distance
         else:
             raise TypeError(f"objective must be a name or a callable on genomes, got {type(objective).__name__}")
-        self._cluster = None if scheduler is None else ClusterObjective(self._score, scheduler)
+        self._cluster: ClusterObjective | None = None
+        if scheduler is not None:
+            packages = ("legible_envs", "optimizers", package_of(workspace), package_of(self._score))
+            cluster = Cluster(scheduler, packages, worker_timeout, deadline)
+            self._cluster = ClusterObjective(self._score, cluster)
 
     def close(self) -> None:
         """Leave the cluster, if there is one."""
@@ -140,32 +160,72 @@ class ClusterObjective:
 
     Args:
         objective: From ``(n, d)`` genomes to ``(n,)`` scores; must pickle, and score each genome by itself.
-        scheduler: Address of a Dask scheduler whose workers have this package.
+        cluster: Its workers share the work.
+
+    Raises:
+        ClusterError: No worker came in time.
     """
 
-    def __init__(self, objective: Objective, scheduler: str) -> None:
-        self._client = connect(scheduler)
-        wait_for_workers(self._client, scheduler)
-        # A task, not scattered data: where a worker is lost that held it, it is made again.
-        self._objective = self._client.submit(_same, objective)
+    def __init__(self, objective: Objective, cluster: Cluster) -> None:
+        self._cluster = cluster
+        self._objective = objective
+        self._sent: Any = None
+        self._holders: set[Process] = set()
+        try:
+            self._cluster.wait()
+        except BaseException:
+            self._cluster.close()
+            raise
 
     def __call__(self, genomes: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
-        """``(n,)`` scores of ``(n, d)`` genomes."""
-        threads = max(1, sum(self._client.nthreads().values()))
-        count = max(1, min(threads, len(genomes) // LEAST))
+        """``(n,)`` scores of ``(n, d)`` genomes.
+
+        Raises:
+            ClusterError: The scheduler was lost, or all workers were and no other came in time.
+        """
+        for _ in range(_TIMES):
+            scores = self._scored(genomes, self._cluster.wait())
+            if scores is not None:
+                return scores
+        raise ClusterError(
+            f"the workers of the scheduler at {self._cluster.scheduler} were lost {_TIMES} times while they scored one "
+            "batch (out of memory?)"
+        )
+
+    def _scored(self, genomes: npt.NDArray[Any], workers: dict[Process, int]) -> npt.NDArray[np.float64] | None:
+        """The scores; None where all workers that were asked are gone."""
+        if self._sent is None or workers.keys() != self._holders:
+            # A task, not scattered data: where a worker is lost that held it, it is made again.
+            self._sent, self._holders = self._cluster.submit(_same, self._objective, workers=workers), set(workers)
+        digests, sent = self._cluster.digests, self._sent
+        count = max(1, min(sum(workers.values()), len(genomes) // LEAST))
         parts = [
-            self._client.submit(_score, self._objective, part, pure=False) for part in np.array_split(genomes, count)
+            self._cluster.submit(_score, digests, sent, part, workers=workers)
+            for part in np.array_split(genomes, count)
         ]
-        return np.concatenate(self._client.gather(parts))
+        try:
+            while any(map(self._cluster.there, workers)):
+                if len(self._cluster.ended(parts, _LOOK)) == count and (scores := self._cluster.results(parts)):
+                    return np.concatenate(scores)
+                self._cluster.workers()
+        except OtherCodeError:
+            self._cluster.forget()
+        except Exception as error:
+            if type(error).__name__ != "KilledWorker":
+                raise
+        self._cluster.cancel(parts)
+        self._sent = None
+        return None
 
     def close(self) -> None:
         """Leave the cluster."""
-        self._client.close()
+        self._cluster.close()
 
 
 def _same(objective: Objective) -> Objective:
     return objective
 
 
-def _score(objective: Objective, genomes: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
+def _score(digests: dict[str, str], objective: Objective, genomes: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
+    expect(digests)
     return np.asarray(objective(genomes), dtype=np.float64)

@@ -17,7 +17,7 @@ from legible_envs.key_space import KeySpace
 from legible_envs.support.validation import choice, entries, integer, integers, is_integer, real, shown
 from legible_envs.workspace import MOST_GENOMES, Workspace
 from optimizers.emitters.registry import EmitterSpec
-from optimizers.errors import SearchInterrupted
+from optimizers.errors import ClusterError, SearchInterrupted
 from optimizers.evaluator import Evaluator, Objective
 from optimizers.progress import Progress
 from optimizers.runs.folder import RunFolder
@@ -51,6 +51,7 @@ def search(
     callbacks: Sequence[Callback] = (),
     progress: bool | None = None,
     scheduler: str | None = None,
+    worker_timeout: float = 60.0,
 ) -> SearchResult:
     """Search a workspace for layouts that score high, of every kind its measures tell apart (MAP-Elites).
 
@@ -85,7 +86,10 @@ def search(
         callbacks: Each is called with the :class:`SearchState` after every batch; returning True stops the search.
         progress: Whether to show a progress bar; None shows it where standard error is a terminal.
         scheduler: Address of a Dask scheduler, such as ``"tcp://10.0.0.1:8786"``, whose workers share the scoring of
-            every batch; the result is the same. Worth it where scoring is dear.
+            every batch; the result is the same. Worth it where scoring is dear. Workers with other code than this
+            process are named in a warning and not used.
+        worker_timeout: Seconds to wait for a worker where the cluster has none that may be used; ``time_limit`` ends
+            the waiting earlier.
 
     Returns:
         The result. Its best layout is pruned of obstacles that do nothing; the archive is as searched.
@@ -95,7 +99,8 @@ def search(
         CheckpointError: A checkpoint cannot be written, read or continued.
         SearchError: The folder holds a run already, or the search cannot go on.
         EmitterError: The emitter is unknown or breaks the contract.
-        ConnectionError: No scheduler answers at the address ``scheduler``.
+        ClusterError: No scheduler answers at the address ``scheduler``, it was lost, or no worker came in time; says
+            how to go on.
 
         Any exception raised after the search began has an attribute ``partial``: the result so far.
     """
@@ -105,6 +110,8 @@ def search(
         evaluations = _DEFAULT_EVALUATIONS if evaluations is None else evaluations
     _check_budget(evaluations, iterations, initial, resume, checkpoint)
     _check_conduct(seed, checkpoint_every, time_limit, callbacks)
+    real("worker_timeout", worker_timeout, 0, unit="seconds")
+    deadline = None if time_limit is None else time.monotonic() + time_limit
     space = workspace if isinstance(workspace, KeySpace) else None
     workspace = workspace if space is None else space.workspace
     if not isinstance(workspace, Workspace):
@@ -112,7 +119,9 @@ def search(
     run = SearchRun(
         workspace=workspace,
         space=space,
-        evaluator=Evaluator(workspace, objective, max_distance, scheduler),
+        evaluator=Evaluator(
+            workspace, objective, max_distance, scheduler, worker_timeout=worker_timeout, deadline=deadline
+        ),
         emitters=_paired(emitter, emitter_options),
         evaluations=evaluations,
         iterations=iterations,
@@ -123,21 +132,22 @@ def search(
     )
     with contextlib.closing(run.evaluator):
         run.open(resume=resume, overwrite=overwrite)
-        return _conduct(run, callbacks, time_limit, progress)
+        return _conduct(run, callbacks, deadline, progress)
 
 
 def _conduct(
     run: SearchRun,
     callbacks: Sequence[Callback],
-    time_limit: float | None,
+    deadline: float | None,
     progress: bool | None,
 ) -> SearchResult:
     """Search until something ends it; the error of one that fails carries what was found."""
-    deadline = None if time_limit is None else time.monotonic() + time_limit
     with _interrupts() as interrupted, Progress(*run.goal(), show=progress) as bar:
         try:
             stopped = _loop(run, bar, callbacks, deadline, interrupted)
             result = run.finish(stopped)
+        except ClusterError as error:
+            raise ClusterError(f"{error}. {_kept(run)}", partial=run.rescue()) from None
         except BaseException as error:
             with contextlib.suppress(AttributeError):
                 error.partial = run.rescue()  # type: ignore[attr-defined]
@@ -146,6 +156,17 @@ def _conduct(
         where = "" if run.folder is None else f"; saved in {run.folder.path}, continue with resume=True"
         raise SearchInterrupted(f"interrupted after {result.evaluations:,} evaluations{where}", partial=result)
     return result
+
+
+def _kept(run: SearchRun) -> str:
+    """What is left of a search whose cluster was lost, and how to go on."""
+    found = f"what was found in {run.state.evaluations:,} evaluations is in this error's `partial`"
+    if run.folder is None:
+        return f"{found[0].upper()}{found[1:]}; with checkpoint=FOLDER a search could go on"
+    return (
+        f"The last checkpoint is in {run.folder.path}: search again with resume=True to go on from there, on a cluster "
+        f"or without one; {found}"
+    )
 
 
 def _loop(

@@ -27,6 +27,7 @@ __all__ = [
     "scheduler_option",
     "settings_from",
     "typed_value",
+    "worker_timeout_option",
     "workers_option",
 ]
 
@@ -177,6 +178,10 @@ workers_option = click.option(
 scheduler_option = click.option(
     "--scheduler", type=SchedulerAddress(), metavar="ADDRESS", help="Run on a Dask cluster, e.g. tcp://10.0.0.1:8786."
 )
+worker_timeout_option = click.option(
+    "--worker-timeout", type=PositiveNumber(zero=True), default=60.0, show_default=True, metavar="SECONDS",
+    help="How long to wait for a worker of the cluster where there is none.",
+)  # fmt: skip
 
 
 def of_one_layout(command: Command) -> Command:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from benchmarks.cli.destinations import check_folder
-from benchmarks.cli.options import out_folder, scheduler_option, workers_option
+from benchmarks.cli.options import out_folder, scheduler_option, worker_timeout_option, workers_option
 from benchmarks.cli.program import STOPPED
 from benchmarks.console import tell
 
@@ -71,6 +72,7 @@ def run_experiment(
     seeds: int | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
+    worker_timeout: float = 60.0,
     progress: Callable[[Event], object] | None = None,
 ) -> Path:
     """Run the trials that are missing, analyse all of them, and write the report.
@@ -82,6 +84,7 @@ def run_experiment(
         seeds: How many seeds in place of the experiment's own number.
         workers: Processes on this machine; all cores if None.
         scheduler: Address of a Dask scheduler instead.
+        worker_timeout: Seconds to wait for a worker of the cluster where there is none.
         progress: Called with an :class:`~benchmarks.trials.Event` whenever something changes.
 
     Returns:
@@ -90,7 +93,14 @@ def run_experiment(
     from benchmarks.reports.experiment_report import write_experiment_report
 
     experiment = EXPERIMENTS[name]
-    how = {"quick": quick, "seeds": seeds, "workers": workers, "scheduler": scheduler, "progress": progress}
+    how = {
+        "quick": quick,
+        "seeds": seeds,
+        "workers": workers,
+        "scheduler": scheduler,
+        "worker_timeout": worker_timeout,
+        "progress": progress,
+    }
     sections = []
     for part, module in experiment.modules.items():
         sections += _run_part(module, folder / part, how)
@@ -117,6 +127,7 @@ def _run_part(module: str, folder: Path, how: Mapping[str, Any]) -> list[Section
 @out_folder
 @workers_option
 @scheduler_option
+@worker_timeout_option
 @click.option("--quiet", is_flag=True, help="Show no progress.")
 def reproduce(
     experiment: str,
@@ -125,13 +136,14 @@ def reproduce(
     out: Path | None,
     workers: int | None,
     scheduler: str | None,
+    worker_timeout: float,
     quiet: bool,
 ) -> None:
     """Run an experiment of the paper again.
 
     Writes result files, tables, figures and report.html. After an interruption the same command continues.
     """
-    from benchmarks.trials import TrialsFailed
+    from benchmarks.trials import TrialsFailed, TrialsStopped
     from benchmarks.trials.progress import TrialsProgress
 
     folder = out or Path("runs") / (f"{experiment}-quick" if quick else experiment)
@@ -145,11 +157,16 @@ def reproduce(
                 seeds=seeds,
                 workers=workers,
                 scheduler=scheduler,
+                worker_timeout=worker_timeout,
                 progress=progress,
             )
     except KeyboardInterrupt:
         tell(f"stopped; finished trials are kept in {folder}; the same command continues from there", err=True)
         raise click.exceptions.Exit(STOPPED) from None
+    except TrialsStopped as error:
+        command = ["legible", "reproduce", experiment, *(["--quick"] if quick else []), "--out", str(folder)]
+        command += ([] if seeds is None else ["--seeds", str(seeds)]) + ["--scheduler", str(scheduler)]
+        raise click.ClickException(f"{error}\nto go on: {shlex.join(command)}") from None
     except TrialsFailed as error:
         raise click.ClickException(str(error)) from error
     _tell(folder)

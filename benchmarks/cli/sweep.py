@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 
 import click
 
 from benchmarks.cli.destinations import check_folder
-from benchmarks.cli.options import out_folder, scheduler_option, workers_option
+from benchmarks.cli.options import out_folder, scheduler_option, worker_timeout_option, workers_option
 from benchmarks.cli.program import STOPPED
 from benchmarks.console import tell
 
@@ -19,8 +20,11 @@ __all__ = ["sweep"]
 @out_folder
 @workers_option
 @scheduler_option
+@worker_timeout_option
 @click.option("--quiet", is_flag=True, help="Show no progress.")
-def sweep(file: Path, out: Path | None, workers: int | None, scheduler: str | None, quiet: bool) -> None:
+def sweep(
+    file: Path, out: Path | None, workers: int | None, scheduler: str | None, worker_timeout: float, quiet: bool
+) -> None:
     """Run a grid of workspaces, objectives, emitters and seeds.
 
     FILE is TOML: `workspaces` (required), `emitters`, `objectives`, `evaluations`, `seeds`, `predictors`, `people`
@@ -31,7 +35,7 @@ def sweep(file: Path, out: Path | None, workers: int | None, scheduler: str | No
     from benchmarks.sweeps.analysis import for_reading
     from benchmarks.sweeps.run import run_sweep
     from benchmarks.sweeps.sweep import Sweep
-    from benchmarks.trials import TrialsFailed
+    from benchmarks.trials import TrialsFailed, TrialsStopped
     from benchmarks.trials.progress import TrialsProgress
 
     plan = Sweep.from_toml(file)
@@ -40,9 +44,14 @@ def sweep(file: Path, out: Path | None, workers: int | None, scheduler: str | No
     failed = None
     try:
         with TrialsProgress(False if quiet else None) as progress:
-            rows = run_sweep(plan, folder, workers=workers, scheduler=scheduler, progress=progress)
+            rows = run_sweep(
+                plan, folder, workers=workers, scheduler=scheduler, worker_timeout=worker_timeout, progress=progress
+            )
     except TrialsFailed as error:
         rows, failed = error.table, error
+    except TrialsStopped as error:
+        command = ["legible", "sweep", str(file), "--out", str(folder), "--scheduler", str(scheduler)]
+        raise click.ClickException(f"{error}\nto go on: {shlex.join(command)}") from None
     except KeyboardInterrupt:
         tell(f"stopped; finished trials are kept in {folder}; the same command continues from there", err=True)
         raise click.exceptions.Exit(STOPPED) from None

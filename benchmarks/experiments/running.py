@@ -25,11 +25,13 @@ class RunOptions(TypedDict, total=False):
     Attributes:
         workers: Processes on this machine; all cores if None.
         scheduler: Address of a Dask scheduler instead.
+        worker_timeout: Seconds to wait for a worker of the cluster where there is none.
         progress: Called with an :class:`~benchmarks.trials.Event` whenever something changes.
     """
 
     workers: int | None
     scheduler: str | None
+    worker_timeout: float
     progress: Callable[[Event], object] | None
 
 

@@ -27,6 +27,7 @@ def run_sweep(
     *,
     workers: int | None = None,
     scheduler: str | None = None,
+    worker_timeout: float = 60.0,
     progress: Callable[[Event], object] | None = None,
 ) -> pd.DataFrame:
     """Run every trial that has no result yet; write ``results.csv`` and ``summary.csv``.
@@ -36,6 +37,7 @@ def run_sweep(
         folder: Where results are kept; see :func:`benchmarks.trials.run_trials`.
         workers: Processes on this machine; all cores if None.
         scheduler: Address of a Dask scheduler instead.
+        worker_timeout: Seconds to wait for a worker of the cluster where there is none.
         progress: Called whenever something changes.
 
     Returns:
@@ -45,10 +47,19 @@ def run_sweep(
 
     Raises:
         TrialsFailed: Some trials failed twice; both tables are written all the same.
+        TrialsStopped: The cluster was lost, or no worker came in time; what was finished is on disk.
     """
     trials = [variant.trial for variant in sweep.variants()]
     try:
-        run_trials(run_search, trials, folder, workers=workers, scheduler=scheduler, progress=progress)
+        run_trials(
+            run_search,
+            trials,
+            folder,
+            workers=workers,
+            scheduler=scheduler,
+            worker_timeout=worker_timeout,
+            progress=progress,
+        )
     except TrialsFailed as error:
         raise TrialsFailed(str(error), error.failures, write_tables(sweep, folder)) from error
     return write_tables(sweep, folder)

@@ -11,7 +11,10 @@ project, which is compared with theirs.
 """
 
 import json
+import os
+import queue
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -84,6 +87,20 @@ def with_irl_maxent(problem: Any) -> Callable[[], Any]:
     return gradient
 
 
+def requests() -> Iterator[str]:
+    """Lines of standard input. Where it is closed, nobody waits for an answer any more, and the process ends."""
+    lines: queue.SimpleQueue[str] = queue.SimpleQueue()
+
+    def read() -> None:
+        for line in sys.stdin:
+            lines.put(line)
+        os._exit(0)
+
+    threading.Thread(target=read, daemon=True).start()
+    while True:
+        yield lines.get()
+
+
 def main() -> None:
     """Answer requests until there are no more."""
     make = {"imitation": with_imitation, "irl-maxent": with_irl_maxent}[sys.argv[1]]
@@ -91,7 +108,7 @@ def main() -> None:
         gradient = make({name: file[name] for name in file.files})
     gradient()
     print("ready", flush=True)
-    for line in sys.stdin:
+    for line in requests():
         if line.startswith("gradient"):
             print("gradient", json.dumps(gradient().tolist()), flush=True)
             continue

@@ -5,7 +5,7 @@ trial ends, so that an interrupted experiment goes on where it stopped.
 """
 
 from benchmarks.trials.functions import TrialName, trial_function
-from benchmarks.trials.running import Event, TrialsFailed, run_trials
+from benchmarks.trials.running import Event, TrialsFailed, TrialsStopped, run_trials
 from benchmarks.trials.store import TrialStore
 
-__all__ = ["Event", "TrialName", "TrialStore", "TrialsFailed", "run_trials", "trial_function"]
+__all__ = ["Event", "TrialName", "TrialStore", "TrialsFailed", "TrialsStopped", "run_trials", "trial_function"]

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import time
 import traceback
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from typing import NamedTuple, Protocol
 
 from benchmarks.trials.functions import resolve
 from benchmarks.trials.store import Rows, Trial, plain
 
-__all__ = ["Outcome", "Pool", "run_one"]
+__all__ = ["News", "Outcome", "Pool", "run_one"]
 
 
 class Outcome(NamedTuple):
@@ -31,11 +31,15 @@ class Outcome(NamedTuple):
     worker: str
 
 
+News = Generator["Outcome | dict[str, Trial]", None, None]
+"""Outcomes in any order; between them, mappings of worker to trial whenever that changes. Closing it ends all work."""
+
+
 class Pool(Protocol):
     """Runs trials: takes them one by one and yields outcomes as they come."""
 
-    def run(self, function: str, trials: Iterator[tuple[int, Trial]]) -> Iterator[Outcome | dict[str, Trial]]:
-        """Outcomes in any order; between them, mappings of worker to trial whenever that changes."""
+    def run(self, function: str, trials: Iterator[tuple[int, Trial]]) -> News:
+        """Run the trials, and what is put back meanwhile."""
 
     def again(self, number: int, trial: Trial) -> None:
         """Put a trial back at the end of the queue."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import warnings
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
@@ -12,12 +13,13 @@ from benchmarks.console import plural
 from benchmarks.trials.attempts import Outcome, Pool
 from benchmarks.trials.functions import name_of, path_of
 from benchmarks.trials.store import Trial, TrialStore
-from legible_envs.support.validation import integer
+from legible_envs.support.validation import integer, real
+from optimizers.errors import ClusterError
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Event", "TrialsFailed", "run_trials"]
+__all__ = ["Event", "TrialsFailed", "TrialsStopped", "run_trials"]
 
 ATTEMPTS: Final = 2
 MOST_WORKERS: Final = 1_024
@@ -66,6 +68,10 @@ class TrialsFailed(RuntimeError):
         self.table = table
 
 
+class TrialsStopped(ClusterError):
+    """The cluster was lost, or had no worker that may be used; finished trials are on disk, the others were not run."""
+
+
 def run_trials(
     function: Callable[[dict[str, Any]], Any] | str,
     trials: Iterable[Trial],
@@ -73,6 +79,7 @@ def run_trials(
     *,
     workers: int | None = None,
     scheduler: str | None = None,
+    worker_timeout: float = 60.0,
     progress: Callable[[Event], object] | None = None,
 ) -> pd.DataFrame:
     """Run a function over trials and keep every result.
@@ -90,8 +97,10 @@ def run_trials(
             it was given one.
         workers: Processes on this machine; all cores if None; 1 runs everything in this process. A script of your own
             that starts several needs the usual ``if __name__ == "__main__":``.
-        scheduler: Address of a Dask scheduler, such as ``"tcp://10.0.0.1:8786"``, whose workers can import
-            ``function``; wins over ``workers``.
+        scheduler: Address of a Dask scheduler, such as ``"tcp://10.0.0.1:8786"``, whose workers have the same code as
+            this process, that of ``function`` included; wins over ``workers``. Workers with other code are named in a
+            warning and not used.
+        worker_timeout: Seconds to wait for a worker of the cluster where it has none that may be used.
         progress: Called with an :class:`Event` whenever something changes.
 
     Returns:
@@ -99,6 +108,8 @@ def run_trials(
 
     Raises:
         TrialsFailed: Some trials failed twice. Raised at the end, when all others are finished.
+        TrialsStopped: The scheduler was lost, or no worker came in time; what was finished is on disk.
+        ClusterError: No scheduler answers at that address.
         ValueError: A trial that JSON cannot hold, or a function that workers cannot find.
     """
     path = path_of(function)
@@ -122,7 +133,11 @@ def run_trials(
     report = progress or (lambda event: None)
     report(event)
     if waiting:
-        _run(_pool(workers, scheduler, len(waiting)), path, unique, waiting, store, event, report)
+        pool = _pool(workers, scheduler, worker_timeout, path, waiting)
+        try:
+            _run(pool, path, unique, waiting, store, event, report)
+        except ClusterError as error:
+            raise TrialsStopped(f"{error}. {_kept(event, store)}") from None
     table = store.table(unique)
     if event.failed:
         keys = {store.key(trial) for trial in unique if store.load(trial) is None}
@@ -146,6 +161,11 @@ def _about_damage(files: Sequence[str]) -> str:
     )
 
 
+def _kept(event: Event, store: TrialStore) -> str:
+    count = f"{event.done} of {plural(event.total, 'trial')}"
+    return f"Finished and kept in {store.folder}: {count}; asked again, the others are run, on a cluster or without one"
+
+
 def _run(
     pool: Pool,
     function: str,
@@ -156,33 +176,50 @@ def _run(
     report: Callable[[Event], object],
 ) -> None:
     attempts: dict[int, int] = {}
-    for news in pool.run(function, iter(waiting)):
-        if not isinstance(news, Outcome):
-            event.running = news
-            report(event)
-            continue
-        trial = trials[news.number]
-        event.last = news
-        if news.rows is not None:
-            store.save(trial, news.rows, news.seconds, news.worker)
-            event.done += 1
-        else:
-            attempts[news.number] = attempts.get(news.number, 0) + 1
-            store.save_failure(trial, news.error or "", attempts[news.number], news.worker)
-            if attempts[news.number] < ATTEMPTS:
-                event.retried += 1
-                pool.again(news.number, trial)
+    # Closed even where the loop ends by an error or Ctrl-C: its workers end with it, not with the garbage.
+    with contextlib.closing(pool.run(function, iter(waiting))) as running:
+        for news in running:
+            if isinstance(news, Outcome):
+                _note(news, trials[news.number], attempts, pool, store, event)
             else:
-                event.failed += 1
-        report(event)
+                event.running = news
+            report(event)
 
 
-def _pool(workers: int | None, scheduler: str | None, num_trials: int) -> Pool:
+def _note(
+    outcome: Outcome, trial: Trial, attempts: dict[int, int], pool: Pool, store: TrialStore, event: Event
+) -> None:
+    """Keep a result; have a failed trial run once more."""
+    event.last = outcome
+    if outcome.rows is not None:
+        store.save(trial, outcome.rows, outcome.seconds, outcome.worker)
+        event.done += 1
+        return
+    attempts[outcome.number] = attempts.get(outcome.number, 0) + 1
+    store.save_failure(trial, outcome.error or "", attempts[outcome.number], outcome.worker)
+    if attempts[outcome.number] < ATTEMPTS:
+        event.retried += 1
+        pool.again(outcome.number, trial)
+    else:
+        event.failed += 1
+
+
+def _pool(
+    workers: int | None,
+    scheduler: str | None,
+    worker_timeout: float,
+    function: str,
+    waiting: Sequence[tuple[int, Trial]],
+) -> Pool:
+    real("worker_timeout", worker_timeout, 0, unit="seconds")
     if scheduler is not None:
         from benchmarks.trials.cluster import ClusterPool
+        from benchmarks.trials.packages import packages_of
 
-        return ClusterPool(scheduler)
+        if function.startswith("__main__:"):
+            raise ValueError(f"workers of a cluster cannot import {function!r} from a script; put it into a module")
+        return ClusterPool(scheduler, packages_of(function, (trial for _, trial in waiting)), worker_timeout)
     from benchmarks.trials.local import InProcess, LocalPool, num_cores
 
     count = num_cores() if workers is None else integer("workers", workers, 1, MOST_WORKERS, also="None")
-    return InProcess() if count == 1 else LocalPool(min(count, num_trials))
+    return InProcess() if count == 1 else LocalPool(min(count, len(waiting)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -50,10 +51,23 @@ def _interrupted(folder: Path, arguments: tuple[str, ...], *delays: float) -> tu
             os.killpg(process.pid, signal.SIGINT)
     try:
         _, error = process.communicate(timeout=120)
+        assert not _left(process.pid), "it left processes behind"
     finally:
-        if process.poll() is None:
+        with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
     return process.returncode, error
+
+
+def _left(group: int) -> bool:
+    """Whether processes of a group stay for longer than ten seconds."""
+    deadline = time.monotonic() + 10
+    while time.monotonic() < deadline:
+        try:
+            os.killpg(group, 0)
+        except ProcessLookupError:
+            return False
+        time.sleep(0.02)
+    return True
 
 
 LONG_COMMANDS = {
@@ -66,9 +80,15 @@ LONG_COMMANDS = {
 }
 
 
+MOMENTS = [
+    *((command, (4.0,)) for command in LONG_COMMANDS),
+    *((command, (1.0,)) for command in ("optimize", "reproduce")),  # while modules are loaded
+    *((command, (4.0, 0.1)) for command in ("optimize", "sweep")),  # twice
+]
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("delays", [(1.0,), (4.0,), (4.0, 0.1)], ids=str)
-@pytest.mark.parametrize("command", LONG_COMMANDS)
+@pytest.mark.parametrize(("command", "delays"), MOMENTS, ids=str)
 def test_ctrl_c_is_a_sentence_and_exit_code_130(command: str, delays: tuple[float, ...], folder: Path) -> None:
     code, error = _interrupted(folder, LONG_COMMANDS[command], *delays)
     assert code == 130, error
@@ -78,8 +98,7 @@ def test_ctrl_c_is_a_sentence_and_exit_code_130(command: str, delays: tuple[floa
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("delay", [0.3, 0.6, 1.2])
-@pytest.mark.parametrize("command", ["score", "show"])
+@pytest.mark.parametrize(("command", "delay"), [("score", 0.3), ("show", 0.6), ("score", 1.2)])
 def test_ctrl_c_while_a_layout_is_scored(command: str, delay: float, folder: Path) -> None:
     code, error = _interrupted(folder, (command, "k.txt"), delay)
     assert (code, error.strip()) in ((130, "stopped"), (0, "")), "stopped, or done before"

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
-import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -17,11 +14,13 @@ import pandas as pd
 import pytest
 
 from benchmarks.trials import Event, TrialName, TrialsFailed, TrialStore, run_trials
+from benchmarks.trials.packages import packages_of
 from benchmarks.trials.store import plain
 from legible_envs.overcooked import OvercookedWorkspace
 from optimizers import search
 from optimizers.cluster import connect
 from tests.benchmarks import trial_functions
+from tests.support.clusters import LocalCluster
 
 TRIALS = [{"seed": seed, "settings": {"size": 3}, "shape": [7, 7]} for seed in range(5)]
 
@@ -218,6 +217,16 @@ def test_bad_functions_and_cells_are_named(tmp_path: Path) -> None:
         run_trials(trial_functions.draw, TRIALS, tmp_path / "file", workers=1)
 
 
+def test_workers_are_asked_for_the_packages_that_trials_name(aisle_package: Path) -> None:
+    ours = ["benchmarks", "legible_envs", "optimizers", "predictors"]
+    trial = {"workspace": {"workspace": "overcooked"}, "label": "a: b", "time": "json:loads", "gone": "no_such:Thing"}
+    assert packages_of("benchmarks.sweeps.run:run_search", [trial]) == ours
+    theirs = {"workspace": {"workspace": "aisle"}, "emitters": [{"emitter": "tests.support.pointing:Mine"}]}
+    assert packages_of("scipy.stats:norm", [trial, theirs]) == sorted(
+        [*ours, "legible_workspace_example", "scipy", "tests"]
+    )
+
+
 def test_a_missing_scheduler_is_named() -> None:
     pytest.importorskip("distributed")
     with pytest.raises(ConnectionError, match=r"no Dask scheduler answers at 'tcp://127.0.0.1:1'"):
@@ -225,54 +234,28 @@ def test_a_missing_scheduler_is_named() -> None:
 
 
 @pytest.fixture(scope="module")
-def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
-    """Address of a scheduler with two workers, each a process of its own, and those processes."""
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LocalCluster]:
+    """A scheduler with two workers."""
     pytest.importorskip("distributed")
-    folder = tmp_path_factory.mktemp("cluster")
-    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])}
-
-    def start(*arguments: str) -> subprocess.Popen[bytes]:
-        command = [sys.executable, "-m", "dask", *arguments, "--host", "127.0.0.1", "--no-dashboard"]
-        return subprocess.Popen(
-            command, env=environment, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-        )
-
-    scheduler_file = folder / "scheduler.json"
-    processes = [start("scheduler", "--scheduler-file", str(scheduler_file), "--port", "0")]
-    try:
-        address = _address(scheduler_file)
-        processes += [start("worker", address, "--nthreads", "1", "--no-nanny") for _ in range(2)]
-        yield address, processes[1:]
-    finally:
-        for process in processes:
-            process.kill()
-            process.wait()
-
-
-def _address(scheduler_file: Path) -> str:
-    for _ in range(300):
-        try:
-            return str(json.loads(scheduler_file.read_text())["address"])
-        except (FileNotFoundError, ValueError):
-            time.sleep(0.1)
-    raise AssertionError("the scheduler did not start")
+    with LocalCluster(tmp_path_factory.mktemp("cluster")) as found:
+        found.add_worker()
+        found.add_worker()
+        yield found
 
 
 @pytest.mark.slow
-def test_a_search_on_a_cluster_finds_what_it_finds_alone(cluster: tuple[str, object]) -> None:
+def test_a_search_on_a_cluster_finds_what_it_finds_alone(cluster: LocalCluster) -> None:
     workspace = OvercookedWorkspace(shape=(5, 5), prefix="sum")
     alone = search(workspace, evaluations=3000, seed=1)
-    spread = search(workspace, evaluations=3000, seed=1, scheduler=cluster[0])
+    spread = search(workspace, evaluations=3000, seed=1, scheduler=cluster.address)
     for field in ("solution", "objective", "index"):
         np.testing.assert_array_equal(alone.archive.data(field), spread.archive.data(field))
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="needs SIGKILL")
-def test_a_cluster_loses_a_worker_and_no_result(
-    cluster: tuple[str, list[subprocess.Popen[bytes]]], tmp_path: Path
-) -> None:
-    address, (victim, _) = cluster
+def test_a_cluster_loses_a_worker_and_no_result(cluster: LocalCluster, tmp_path: Path) -> None:
+    address, victim = cluster.address, cluster.workers[0]
     trials = with_marks(tmp_path, 12, seconds=0.5)
     seen: set[str] = set()
 

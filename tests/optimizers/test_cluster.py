@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
+import functools
+import importlib
+import os
+import re
 import socket
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
 
 import pytest
 
-from optimizers.cluster import check_address, connect, wait_for_workers
+from optimizers.cluster import check_address, connect
+from optimizers.fingerprint import Fingerprint, OtherCodeError, differences, expect, fingerprint, package_of, remarks
 
 pytest.importorskip("distributed")
 
@@ -92,26 +101,76 @@ def test_other_texts_are_no_addresses(address: str) -> None:
         check_address(address)
 
 
-class _Scheduler:
-    """A scheduler whose workers come after so many questions."""
-
-    def __init__(self, questions: int) -> None:
-        self.questions = questions
-
-    def nthreads(self) -> dict[str, int]:
-        self.questions -= 1
-        return {} if self.questions >= 0 else {"a worker": 2}
+OURS = Fingerprint("0.2", {"a": "12", "b": "34"}, "3.11.7", {"numpy": "2.1.3", "numba": "0.61.0"}, "Linux x86_64")
 
 
-def test_workers_are_waited_for_and_that_is_said() -> None:
-    with pytest.warns(UserWarning, match=r"tcp://x:1 has no workers; waiting up to 30 s .*`dask worker tcp://x:1`"):
-        wait_for_workers(_Scheduler(3), "tcp://x:1", 30)  # type: ignore[arg-type]
-    wait_for_workers(_Scheduler(0), "tcp://x:1", 0)  # type: ignore[arg-type]
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"digests": {"a": "12", "b": "35"}}, r"^its files of b are others \(digest 35, ours 34\)$"),
+        ({"digests": {"a": "12", "b": "35"}, "version": "0.1"}, r"version 0\.1, ours 0\.2; digest 35, ours 34"),
+        ({"digests": {"a": "12", "b": ""}}, r"^it lacks the package b$"),
+        ({"digests": {}}, "it lacks the package a"),
+        ({"changed": ("a.x", "a.y")}, r"^a\.x and 1 more changed on its disk since it was started: start it again$"),
+        ({"python": "3.12.0"}, r"^it runs Python 3\.12\.0, we 3\.11\.7$"),
+        ({"libraries": {"numpy": "2.2.0", "numba": "0.61.0"}}, r"^it has numpy 2\.2\.0, we 2\.1\.3$"),
+        ({"libraries": {"numpy": "2.1.3"}}, "^it lacks numba$"),
+    ],
+)
+def test_other_code_is_told_apart(change: dict[str, Any], reason: str) -> None:
+    theirs = dataclasses.replace(OURS, **change)
+    assert re.search(reason, "; ".join(differences(OURS, theirs)))
+    assert differences(OURS, OURS) == remarks(OURS, OURS) == []
 
 
-def test_workers_are_not_waited_for_for_ever() -> None:
-    with (
-        pytest.warns(UserWarning, match="no workers"),
-        pytest.raises(ConnectionError, match=r"no worker joined the scheduler at tcp://x:1 within 0.2 s"),
-    ):
-        wait_for_workers(_Scheduler(10_000), "tcp://x:1", 0.2)  # type: ignore[arg-type]
+@pytest.mark.parametrize(
+    "change",
+    [{"machine": "Darwin arm64"}, {"libraries": {"numpy": "2.1.4", "numba": "0.61.0"}}, {"python": "3.11.9"},
+     {"version": "0.3"}, {"libraries": OURS.libraries | {"torch": "2.4"}}],
+)  # fmt: skip
+def test_smaller_differences_are_no_reason_to_refuse(change: dict[str, Any]) -> None:
+    theirs = dataclasses.replace(OURS, **change)
+    assert differences(OURS, theirs) == []
+    assert len(remarks(OURS, theirs)) == ("machine" in change or change.get("libraries", {}).get("numpy") == "2.1.4")
+
+
+def test_a_digest_is_of_the_code_and_its_names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not of line ends, nor of what else lies in the folder."""
+    monkeypatch.syspath_prepend(tmp_path)
+    files = {"__init__.py": b"", "x.py": b"a = 1\nb = 2\n", "sub/y.yaml": b"z: 1\n"}
+    changes = {
+        "same": {"x.py": b"a = 1\r\nb = 2\r\n", "notes.txt": b"?", ".#x.py": b"?", "__pycache__/x.pyc": b"?"},
+        "edited": {"x.py": b"a = 1\nb = 3\n"},
+        "data": {"sub/y.yaml": b"z: 2\n"},
+        "moved": {"x.py": b"", "y.py": b"a = 1\nb = 2\n"},
+    }
+    digests = {}
+    for name, change in {"plain": {}, **changes}.items():
+        for path, content in {**files, **change}.items():
+            where = tmp_path / f"digest_{name}" / path
+            where.parent.mkdir(parents=True, exist_ok=True)
+            where.write_bytes(content)
+        importlib.invalidate_caches()
+        digests[name] = fingerprint(f"digest_{name}").digests[f"digest_{name}"]
+    assert digests["same"] == digests["plain"] != ""
+    assert len(set(digests.values())) == 4
+    assert fingerprint("no_such_package", "").digests == {"no_such_package": ""}
+
+
+def test_work_checks_the_code_itself() -> None:
+    expect(fingerprint("optimizers").digests)
+    with pytest.raises(OtherCodeError, match="this worker has other files of optimizers than"):
+        expect({"optimizers": "another"})
+
+
+def test_a_module_that_was_edited_later_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "edited_module.py").write_text("a = 1\n")
+    monkeypatch.setitem(sys.modules, "edited_module", importlib.import_module("edited_module"))
+    os.utime(tmp_path / "edited_module.py", (time.time() + 60,) * 2)
+    assert fingerprint("edited_module").changed == ("edited_module",)
+
+
+def test_packages_of_functions_and_objects() -> None:
+    assert package_of(fingerprint) == package_of(OURS) == "optimizers"
+    assert package_of(len) == package_of(functools.partial(len)) == package_of(3) == ""
