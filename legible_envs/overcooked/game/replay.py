@@ -6,7 +6,7 @@ pots (in reading order of their cells), ``R`` of recipes.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -118,7 +118,7 @@ def _check_values(layout: OvercookedLayout, states: GameArrays, num_orders: int)
     """The kernels look up cells and orders by these numbers."""
     height, width = layout.shape
     greatest_item = SOUP + num_orders - 1
-    ranges = {
+    ranges: dict[str, tuple[npt.NDArray[Any], int]] = {
         "rows of `cells`": (np.asarray(states.cells)[..., 0], height - 1),
         "columns of `cells`": (np.asarray(states.cells)[..., 1], width - 1),
         "`facing`": (np.asarray(states.facing), 3),

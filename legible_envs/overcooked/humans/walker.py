@@ -178,9 +178,11 @@ class Walker(ABC):
             raise LayoutError(
                 f"`start` must be a station's name or a cell (row, column), got {shown(start)}", rule="start"
             )
+        if not isinstance(start, str) and not layout.is_floor(start):
+            raise LayoutError(
+                f"row {start[0]}, column {start[1]} is no floor cell", rule="start", cell=(start[0], start[1])
+            )
         cells = layout.access(start) if isinstance(start, str) else ((int(start[0]), int(start[1])),)
-        if not isinstance(start, str) and not layout.is_floor(cells[0]):
-            raise LayoutError(f"row {start[0]}, column {start[1]} is no floor cell", rule="start", cell=cells[0])
         field = self._field(layout, goal)
         near = [cell for cell in cells if field.cost_to_go[cell[0] * field.width + cell[1]] < np.inf]
         where = repr(start) if isinstance(start, str) else f"row {start[0]}, column {start[1]}"
