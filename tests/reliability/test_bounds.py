@@ -12,7 +12,7 @@ import pytest
 
 from tests.reliability.conftest import Repeats
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(0)]  # compiling takes minutes on a busy machine
 
 ROOT = Path(__file__).parents[2]
 CHECKED = {"NUMBA_BOUNDSCHECK": "1", "NUMBA_OPT": "1"}
