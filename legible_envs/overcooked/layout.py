@@ -290,9 +290,12 @@ class OvercookedLayout:
         return tuple(cell for dr, dc in NEIGHBOURS if self.is_floor(cell := (row + dr, col + dc)))
 
     def is_floor(self, cell: Sequence[int]) -> bool:
-        """Whether a person can stand on the cell; False outside the grid."""
+        """Whether a person can stand on the cell; False outside the grid, and for fractions."""
         row, col = cell[0], cell[1]
-        return 0 <= row < self.shape[0] and 0 <= col < self.shape[1] and bool(self._cells[row, col] == FLOOR)
+        if not (0 <= row < self.shape[0] and 0 <= col < self.shape[1]):
+            return False
+        at = int(row), int(col)
+        return at == (row, col) and bool(self._cells[at] == FLOOR)
 
     @property
     def num_obstacles(self) -> int:

@@ -63,6 +63,9 @@ class ScriptedPlayer:
         Args:
             obs: The observation; not needed, taken so that every policy is called alike.
             info: The info returned with it.
+
+        Raises:
+            ValueError: An info of kitchens of another shape.
         """
         if self.num_envs is None:
             return self._act(0, self.env.unwrapped.arrays(), info["goal_mask"], info["action_mask"], info["layout_id"])
@@ -101,6 +104,11 @@ class ScriptedPlayer:
         action_mask: npt.NDArray[np.int8],
         layout_id: int,
     ) -> int:
+        shape = int(arrays[2][HEIGHT]), int(arrays[2][WIDTH])
+        if np.shape(goal_mask) != shape:
+            raise ValueError(
+                f"`info` is of another environment: its goal_mask has shape {np.shape(goal_mask)}, the kitchen {shape}"
+            )
         if not self._has_goal(index, goal_mask, layout_id):
             return STAY
         action = self._approach(index, arrays, bool(action_mask[INTERACT]))

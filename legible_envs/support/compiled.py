@@ -2,7 +2,8 @@
 
 Compiled code lies in ``$NUMBA_CACHE_DIR`` if the user set it, else in the user's cache folder (Linux:
 ``~/.cache/legible-envs/numba``), never beside the package. Deleting the folder is always safe. With
-``NUMBA_DISABLE_JIT=1`` every kernel runs as plain Python.
+``NUMBA_DISABLE_JIT=1`` every kernel runs as plain Python; with ``NUMBA_BOUNDSCHECK=1`` an index outside an array is an
+``IndexError``. Code that checks lies in a folder of its own: numba would take one for the other.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ def cache_folder(package: str = "legible_envs") -> Path | None:
     root = os.environ.get("NUMBA_CACHE_DIR")
     try:
         folder = Path(root) if root else user_cache_path("legible-envs") / "numba" / _kernels_digest(package)
+        folder = folder / "boundscheck" if numba.config.BOUNDSCHECK else folder
         folder.mkdir(parents=True, exist_ok=True)
         return folder if os.access(folder, os.W_OK) else None
     except OSError:
@@ -49,7 +51,18 @@ def _kernels_digest(package: str) -> str:
 
 
 def kernel(function: _F) -> _F:
-    """Compile a function of plain arrays and numbers; see the module's docstring for where the result is kept."""
+    """Compile a function of plain arrays and numbers; see the module's docstring for where the result is kept.
+
+    Raises:
+        TypeError: An argument is a random generator, by its annotation: Ctrl-C while such a function is entered crashes
+            Python. Take :class:`~legible_envs.support.random_kernels.Bits` instead.
+    """
+    for name, annotation in function.__annotations__.items():
+        if "Generator" in str(annotation):
+            raise TypeError(
+                f"kernel {function.__name__} takes a random generator, `{name}`: Ctrl-C while it is entered can crash "
+                "Python; take `bits: Bits` (legible_envs.support.random_kernels) and call it by `call_drawing`"
+            )
     folder = cache_folder(function.__module__.partition(".")[0])
     if folder is None:
         return numba.njit(error_model="numpy")(function)

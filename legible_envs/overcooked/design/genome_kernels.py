@@ -11,6 +11,7 @@ import numpy.typing as npt
 from legible_envs.overcooked.scoring.exact_kernels import BLOCKED
 from legible_envs.overcooked.scoring.genome_kernels import Genomes, Geometry, connected, place_obstacles
 from legible_envs.support.compiled import kernel
+from legible_envs.support.random_kernels import Bits, below, random
 
 __all__ = ["perturb_genomes", "sample_genomes"]
 
@@ -19,11 +20,11 @@ TRIES_PER_KIND = 50
 
 
 @kernel
-def draw_stations(genome: Genomes, geometry: Geometry, access: npt.NDArray[np.int64], rng: np.random.Generator) -> bool:
+def draw_stations(bits: Bits, genome: Genomes, geometry: Geometry, access: npt.NDArray[np.int64]) -> bool:
     """Draw a slot for every station, any slot equally likely; False as soon as two draws break a rule."""
     num_stations, num_slots = geometry.allowed.shape
     for i in range(num_stations):
-        slot = rng.integers(0, num_slots)
+        slot = below(bits, num_slots)
         if not geometry.allowed[i, slot]:
             return False
         for j in range(i):
@@ -35,9 +36,7 @@ def draw_stations(genome: Genomes, geometry: Geometry, access: npt.NDArray[np.in
 
 
 @kernel
-def sample_genomes(
-    genomes: Genomes, geometry: Geometry, obstacle_rate: float, max_tries: int, rng: np.random.Generator
-) -> int:
+def sample_genomes(bits: Bits, genomes: Genomes, geometry: Geometry, obstacle_rate: float, max_tries: int) -> int:
     """Fill ``genomes [B, d]`` with random valid ones by rejecting whole layouts.
 
     Every station draws any slot and every inner cell is blocked with probability ``obstacle_rate``, independently; the
@@ -55,10 +54,10 @@ def sample_genomes(
         genome = genomes[b]
         found = False
         for _ in range(max_tries):
-            if not draw_stations(genome, geometry, access, rng):
+            if not draw_stations(bits, genome, geometry, access):
                 continue
             for i in range(len(geometry.inner)):
-                genome[num_stations + i] = 1 if rng.random() < obstacle_rate else 0
+                genome[num_stations + i] = 1 if random(bits) < obstacle_rate else 0
             if place_obstacles(genome, geometry, floor) and connected(floor, geometry.stride, access, seen, stack):
                 found = True
                 break
@@ -68,14 +67,14 @@ def sample_genomes(
 
 
 @kernel
-def change(genome: Genomes, kind: int, geometry: Geometry, rng: np.random.Generator) -> int:
+def change(bits: Bits, genome: Genomes, kind: int, geometry: Geometry) -> int:
     """Try one random small change in place.
 
     Args:
+        bits: Source of randomness.
         genome: ``[d]`` a valid genome.
         kind: 0 move a station to a free counter, 1 swap two stations, 2 add an obstacle, 3 remove one.
         geometry: Where stations and obstacles may stand.
-        rng: Source of randomness.
 
     Returns:
         0: nothing was changed (the draw did not apply). 1: changed, and still connected if it was. 2: changed, and
@@ -83,8 +82,8 @@ def change(genome: Genomes, kind: int, geometry: Geometry, rng: np.random.Genera
     """
     num_stations, num_slots = geometry.allowed.shape
     if kind == 0:
-        i = rng.integers(0, num_stations)
-        slot = rng.integers(0, num_slots)
+        i = below(bits, num_stations)
+        slot = below(bits, num_slots)
         if slot == genome[i] or not geometry.allowed[i, slot]:
             return 0
         for j in range(num_stations):
@@ -93,13 +92,13 @@ def change(genome: Genomes, kind: int, geometry: Geometry, rng: np.random.Genera
         genome[i] = slot
         return 2
     if kind == 1:
-        i = rng.integers(0, num_stations)
-        other = rng.integers(0, num_stations)
+        i = below(bits, num_stations)
+        other = below(bits, num_stations)
         if i == other or not (geometry.allowed[i, genome[other]] and geometry.allowed[other, genome[i]]):
             return 0
         genome[i], genome[other] = genome[other], genome[i]
         return 1
-    i = rng.integers(0, len(geometry.inner))
+    i = below(bits, len(geometry.inner))
     bit = num_stations + i
     if kind == 2 and genome[bit] == 0 and geometry.may_block[i]:
         genome[bit] = 1
@@ -111,7 +110,7 @@ def change(genome: Genomes, kind: int, geometry: Geometry, rng: np.random.Genera
 
 
 @kernel
-def perturb_genomes(parents: Genomes, k: int, geometry: Geometry, rng: np.random.Generator, children: Genomes) -> None:
+def perturb_genomes(bits: Bits, parents: Genomes, k: int, geometry: Geometry, children: Genomes) -> None:
     """Write ``k`` valid children of each of ``parents [B, d]`` to ``children [B * k, d]``, grouped by parent.
 
     Each child differs by one change: a station moved to a free counter, two stations swapped, an obstacle added, or
@@ -129,9 +128,9 @@ def perturb_genomes(parents: Genomes, k: int, geometry: Geometry, rng: np.random
             kind = 0
             for attempt in range(MAX_TRIES):
                 if attempt % TRIES_PER_KIND == 0:
-                    kind = int(rng.integers(0, 4))
+                    kind = below(bits, 4)
                 child[:] = parents[b]
-                outcome = change(child, kind, geometry, rng)
+                outcome = change(bits, child, kind, geometry)
                 if outcome == 0:
                     continue
                 if outcome == 1:

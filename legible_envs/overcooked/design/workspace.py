@@ -24,6 +24,7 @@ from legible_envs.overcooked.scoring.boltzmann import HumanModel, HumanName
 from legible_envs.overcooked.scoring.genome_kernels import score_genomes, valid_genomes
 from legible_envs.overcooked.scoring.scorer import OvercookedScorer
 from legible_envs.overcooked.scoring.tables import check_task, make_tables
+from legible_envs.support.random_bits import call_drawing
 from legible_envs.support.validation import choice, entries, integer, real, shown
 from legible_envs.tasks import TaskGraph
 from legible_envs.workspace import Array, Workspace, as_batch, as_single, check_draws, make_workspace
@@ -222,7 +223,9 @@ class OvercookedWorkspace(Workspace):
         first = 0
         if self._home is not None and n:
             genomes[0], first = self._home, 1
-        found = kernels.sample_genomes(genomes[first:], self.rules.geometry, obstacle_rate, MAX_SAMPLE_TRIES, rng)
+        found = call_drawing(
+            rng, kernels.sample_genomes, genomes[first:], self.rules.geometry, obstacle_rate, MAX_SAMPLE_TRIES
+        )
         if found < n - first:
             raise LayoutError(
                 f"no valid layout among {MAX_SAMPLE_TRIES:,} random ones: a {self.shape[0]}x{self.shape[1]} kitchen "
@@ -243,7 +246,7 @@ class OvercookedWorkspace(Workspace):
         if not (valid & self.valid(parents)).all():
             self.decode(np.asarray(genomes)[int(np.argmin(valid & self.valid(parents)))])
         children = np.empty((len(parents) * k, self.genome_size), dtype=self.genome_dtype)
-        kernels.perturb_genomes(parents, k, self.rules.geometry, rng, children)
+        call_drawing(rng, kernels.perturb_genomes, parents, k, self.rules.geometry, children)
         return children
 
     def valid(self, genomes: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:

@@ -6,7 +6,7 @@ pots (in reading order of their cells), ``R`` of recipes.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -69,7 +69,8 @@ def predict_transitions(
         ``(following, rewards)``: the ``T`` states that follow, and ``(T,)`` rewards (20 per delivery).
 
     Raises:
-        ValueError: Arrays whose shapes do not fit each other or the kitchen, or actions out of range.
+        ValueError: Arrays whose shapes do not fit each other or the kitchen; actions, cells, directions or items out of
+            range.
 
     Example:
         >>> following, _ = predict_transitions(layout, states, actions)                   # doctest: +SKIP
@@ -81,6 +82,7 @@ def predict_transitions(
     game = RULE_SETS[rules] if isinstance(rules, str) else rules
     joint = np.ascontiguousarray(actions, dtype=np.int64)
     _check_shapes(layout, states, joint, len(game.recipes))
+    _check_values(layout, states, len(game.recipes))
     num_pots = len(layout.named("pot"))
     packed = pack_rules(game, layout.shape, joint.shape[1], num_pots)
     starts = [(int(row), int(col)) for row, col in states.cells[0]] if len(joint) else [(0, 0)] * joint.shape[1]
@@ -110,6 +112,24 @@ def _check_shapes(
         array = getattr(states, name)
         if array is not None and np.shape(array) != shape:
             raise ValueError(f"`{name}` must have shape {shape} to fit the actions, got {np.shape(array)}")
+
+
+def _check_values(layout: OvercookedLayout, states: GameArrays, num_orders: int) -> None:
+    """The kernels look up cells and orders by these numbers."""
+    height, width = layout.shape
+    greatest_item = SOUP + num_orders - 1
+    ranges: dict[str, tuple[npt.NDArray[Any], int]] = {
+        "rows of `cells`": (np.asarray(states.cells)[..., 0], height - 1),
+        "columns of `cells`": (np.asarray(states.cells)[..., 1], width - 1),
+        "`facing`": (np.asarray(states.facing), 3),
+        "`held`": (np.asarray(states.held), greatest_item),
+        "`counters`": (np.asarray(states.counters), greatest_item),
+    }
+    for name, (values, greatest) in ranges.items():
+        wrong = ~((values >= 0) & (values <= greatest))
+        if wrong.any():
+            first = np.argwhere(wrong)[0].tolist()
+            raise ValueError(f"{name} must be integers 0..{greatest}, got {values[tuple(first)]} in state {first[0]}")
 
 
 def _pack(

@@ -16,7 +16,7 @@ from legible_envs.overcooked.layout import FLOOR, OvercookedLayout
 from legible_envs.rollouts.trajectory import Trajectory
 from legible_envs.support.validation import real, shown
 
-__all__ = ["RationalityFit", "RationalitySpread", "fit_rationality", "goal_field", "rationality_spread"]
+__all__ = ["RationalityFit", "RationalitySpread", "fit_rationality", "goal_field", "rationality_spread", "walked_paths"]
 
 Floats = npt.NDArray[np.float64]
 
@@ -164,24 +164,11 @@ def rationality_spread(
 
 
 def _collect(trajectories: Sequence[Trajectory], names: Sequence[str], cell_costs: npt.ArrayLike | None) -> _Steps:
-    fields: dict[tuple[object, str], GoalField] = {}
     excess, taken, who = [], [], []
-    for number, trajectory in enumerate(trajectories):
-        if not isinstance(trajectory.layout, OvercookedLayout) or trajectory.goal is None or not trajectory.is_grid:
-            raise ValueError(f"trajectory {number} has no kitchen, no goal, or positions instead of cells")
-        key = trajectory.layout, trajectory.goal
-        if key not in fields:
-            fields[key] = goal_field(trajectory.layout, trajectory.layout.stations[trajectory.goal], cell_costs)
-        field = fields[key]
-        cells = [int(row) * field.width + int(col) for row, col in trajectory.states.tolist()]
-        for i, (before, after) in enumerate(itertools.pairwise(cells)):
+    paths = walked_paths(trajectories, cell_costs)
+    for trajectory, (cells, field) in zip(trajectories, paths, strict=True):
+        for before, after in itertools.pairwise(cells):
             options = [neighbour(before, direction, field.height, field.width) for direction in range(4)]
-            if not field.floor[before] or after not in options or not is_option(after, field):
-                (a, b), (c, d) = divmod(before, field.width), divmod(after, field.width)
-                raise ValueError(
-                    f"trajectory {number}: the step after state {i}, from row {a}, column {b} to row {c}, column {d}, "
-                    f"is not to a neighbouring floor cell or into {trajectory.goal!r}"
-                )
             costs = np.array([_cost(option, field) for option in options])
             excess.append(costs - costs.min())
             taken.append(_cost(after, field) - costs.min())
@@ -190,6 +177,50 @@ def _collect(trajectories: Sequence[Trajectory], names: Sequence[str], cell_cost
     if not len(table) or not (np.isfinite(table).sum(axis=1) > 1).any():
         raise ValueError(f"{len(trajectories)} trajectories have no step at which there was a choice")
     return _Steps(table, np.array(taken), np.array(who, dtype=np.intp))
+
+
+def walked_paths(
+    trajectories: Sequence[Trajectory], cell_costs: npt.ArrayLike | None = None
+) -> list[tuple[list[int], GoalField]]:
+    """The cells of each trajectory, numbered row by row, and the costs to go to its goal.
+
+    Raises:
+        ValueError: A trajectory without layout or goal, that leaves its layout, or that jumps (naming the state).
+    """
+    fields: dict[tuple[object, str], GoalField] = {}
+    paths = []
+    for number, trajectory in enumerate(trajectories):
+        layout, goal = trajectory.layout, trajectory.goal
+        if not isinstance(layout, OvercookedLayout) or goal is None or not trajectory.is_grid:
+            raise ValueError(f"trajectory {number} has no kitchen, no goal, or positions instead of cells")
+        if goal not in layout.stations:
+            raise ValueError(f"trajectory {number}: no station {goal!r}; this kitchen has {list(layout.stations)}")
+        if (layout, goal) not in fields:
+            fields[layout, goal] = goal_field(layout, layout.stations[goal], cell_costs)
+        paths.append((_walked_cells(trajectory, number, fields[layout, goal]), fields[layout, goal]))
+    return paths
+
+
+def _walked_cells(trajectory: Trajectory, number: int, field: GoalField) -> list[int]:
+    states = trajectory.states
+    if len(states) and states.shape[1] != 2:
+        raise ValueError(f"trajectory {number}: expected (row, col) cells, got states of shape {states.shape}")
+    for i, (row, col) in enumerate(states.tolist()):
+        if not (0 <= row < field.height and 0 <= col < field.width):
+            raise ValueError(
+                f"trajectory {number}: state {i}, row {row}, column {col}, lies outside its "
+                f"{field.height}x{field.width} kitchen"
+            )
+    cells = [row * field.width + col for row, col in states.tolist()]
+    for i, (before, after) in enumerate(itertools.pairwise(cells)):
+        options = [neighbour(before, direction, field.height, field.width) for direction in range(4)]
+        if not field.floor[before] or after not in options or not is_option(after, field):
+            (a, b), (c, d) = divmod(before, field.width), divmod(after, field.width)
+            raise ValueError(
+                f"trajectory {number}: the step after state {i}, from row {a}, column {b} to row {c}, column {d}, "
+                f"is not to a neighbouring floor cell or into {trajectory.goal!r}"
+            )
+    return cells
 
 
 def _cost(cell: int, field: GoalField) -> float:

@@ -15,6 +15,7 @@ import numpy.typing as npt
 from legible_envs.overcooked.game.vectors import INTERACT, STAY
 from legible_envs.overcooked.grid_kernels import neighbour
 from legible_envs.support.compiled import kernel
+from legible_envs.support.random_kernels import Bits, random
 
 __all__ = [
     "BOLTZMANN",
@@ -170,7 +171,7 @@ def choose_step(
 
 @kernel
 def sample_walk(
-    kind: int, params: Floats, start: int, field: GoalField, rng: np.random.Generator, path: npt.NDArray[np.int64]
+    bits: Bits, kind: int, params: Floats, start: int, field: GoalField, path: npt.NDArray[np.int64]
 ) -> int:
     """Write a person's cells to ``path [longest]``: the floor cells from ``start`` on, then the goal's cell.
 
@@ -181,7 +182,7 @@ def sample_walk(
     cell, heading = start, -1
     path[0] = start
     for length in range(1, len(path)):
-        heading = choose_step(kind, params, cell, heading, field, memory, rng.random(), weights)
+        heading = choose_step(kind, params, cell, heading, field, memory, random(bits), weights)
         cell = neighbour(cell, heading, field.height, field.width)
         path[length] = cell
         if cell == field.station:
@@ -247,29 +248,27 @@ def choose_action(
 
 
 @kernel
-def dawdle(
-    cell: int, facing: int, field: GoalField, idle: float, turn: float, rng: np.random.Generator
-) -> tuple[int, int]:
+def dawdle(bits: Bits, cell: int, facing: int, field: GoalField, idle: float, turn: float) -> tuple[int, int]:
     """Ticks spent standing and looking around before something is done, and the facing afterwards."""
     ticks = 0
     while True:
-        u = rng.random()
+        u = random(bits)
         if u >= idle + turn:
             return ticks, facing
         ticks += 1
         if u >= idle:
-            towards = look_around(cell, field.height, field.width, field.floor, rng.random())
+            towards = look_around(cell, field.height, field.width, field.floor, random(bits))
             facing = facing if towards < 0 else towards
 
 
 @kernel
 def sample_times(
+    bits: Bits,
     path: npt.NDArray[np.int64],
     facing: int,
     field: GoalField,
     idle: float,
     turn: float,
-    rng: np.random.Generator,
     ticks: npt.NDArray[np.int64],
 ) -> None:
     """Write to ``ticks [T]`` when each cell of ``path [T]`` is entered, and when the goal at its end has been used.
@@ -281,10 +280,10 @@ def sample_times(
         direction = 0
         while neighbour(path[i - 1], direction, field.height, field.width) != path[i]:
             direction += 1
-        waited, facing = dawdle(path[i - 1], facing, field, idle, turn, rng)
+        waited, facing = dawdle(bits, path[i - 1], facing, field, idle, turn)
         ticks[i] = ticks[i - 1] + waited + 1
         if i == len(path) - 1 and facing != direction:
-            ticks[i] += 1 + dawdle(path[i - 1], direction, field, idle, 0.0, rng)[0]
+            ticks[i] += 1 + dawdle(bits, path[i - 1], direction, field, idle, 0.0)[0]
         facing = direction
 
 

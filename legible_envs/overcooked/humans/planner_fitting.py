@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from legible_envs.overcooked.humans.fitting import fit_rationality, goal_field, rationality_spread
+from legible_envs.overcooked.humans.fitting import fit_rationality, rationality_spread, walked_paths
 from legible_envs.overcooked.humans.kernels import GoalField, step_probabilities
 from legible_envs.overcooked.humans.simulation import BoltzmannWalker, PlannerWalker, Walker
-from legible_envs.overcooked.layout import OvercookedLayout
 
 if TYPE_CHECKING:
     from legible_envs.rollouts.trajectory import Trajectory
@@ -100,7 +99,8 @@ def fit_planner(trajectories: Sequence[Trajectory], grid: Mapping[str, Sequence[
         grid: Values tried.
 
     Raises:
-        ValueError: No trajectories, or some without a kitchen or a goal.
+        ValueError: No trajectories or no steps; a trajectory without a kitchen or a goal, that does not fit its
+            kitchen, or that jumps.
     """
     if not len(trajectories):
         raise ValueError("the planner is fitted to at least one trajectory, got none")
@@ -154,16 +154,14 @@ def best_slip(planned: Floats, slipped: Floats) -> tuple[float, float]:
 
 def _prepared(trajectories: Sequence[Trajectory]) -> Recorded:
     """Paths as cell numbers, the costs to go to each goal, and the participant."""
-    fields: dict[tuple[object, str], GoalField] = {}
-    found: Recorded = []
-    for trajectory in trajectories:
-        if not isinstance(trajectory.layout, OvercookedLayout) or trajectory.goal is None:
-            raise ValueError("trajectories to fit participants on need a kitchen and a goal")
-        key = trajectory.layout, trajectory.goal
-        if key not in fields:
-            fields[key] = goal_field(trajectory.layout, trajectory.layout.stations[trajectory.goal])
-        path = trajectory.states[:, 0].astype(np.int64) * trajectory.layout.shape[1] + trajectory.states[:, 1]
-        found.append((path.astype(np.int64), fields[key], trajectory.participant))
+    paths = zip(trajectories, walked_paths(trajectories), strict=True)
+    found = [
+        (np.array(cells, dtype=np.int64), field, trajectory.participant)
+        for trajectory, (cells, field) in paths
+        if len(cells) > 1
+    ]
+    if not found:
+        raise ValueError(f"the planner is fitted to steps; {len(trajectories)} trajectories have none")
     return found
 
 

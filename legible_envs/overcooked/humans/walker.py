@@ -18,6 +18,7 @@ from legible_envs.overcooked.humans.kernels import GoalField, sample_times, samp
 from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.overcooked.reach import Reach, reach_from
 from legible_envs.rollouts.trajectory import Trajectory
+from legible_envs.support.random_bits import call_drawing
 from legible_envs.support.validation import entries, real, shown
 
 __all__ = ["Walker", "draw_one", "draw_preferences", "nearest_first"]
@@ -162,7 +163,7 @@ class Walker(ABC):
         around = [neighbour(int(path[0]), direction, field.height, field.width) for direction in range(4)]
         facing = around.index(row * field.width + col)
         ticks = np.empty(len(path), dtype=np.int64)
-        sample_times(path, facing, field, self.idle, self.turn, rng, ticks)
+        call_drawing(rng, sample_times, path, facing, field, self.idle, self.turn, ticks)
         return np.column_stack(np.divmod(path, field.width)), ticks
 
     def _field(self, layout: OvercookedLayout, goal: str) -> GoalField:
@@ -177,9 +178,11 @@ class Walker(ABC):
             raise LayoutError(
                 f"`start` must be a station's name or a cell (row, column), got {shown(start)}", rule="start"
             )
+        if not isinstance(start, str) and not layout.is_floor(start):
+            raise LayoutError(
+                f"row {start[0]}, column {start[1]} is no floor cell", rule="start", cell=(start[0], start[1])
+            )
         cells = layout.access(start) if isinstance(start, str) else ((int(start[0]), int(start[1])),)
-        if not isinstance(start, str) and not layout.is_floor(cells[0]):
-            raise LayoutError(f"row {start[0]}, column {start[1]} is no floor cell", rule="start", cell=cells[0])
         field = self._field(layout, goal)
         near = [cell for cell in cells if field.cost_to_go[cell[0] * field.width + cell[1]] < np.inf]
         where = repr(start) if isinstance(start, str) else f"row {start[0]}, column {start[1]}"
@@ -191,7 +194,7 @@ class Walker(ABC):
     def _walk(self, field: GoalField, cell: Cell, rng: np.random.Generator) -> npt.NDArray[np.int64]:
         start = cell[0] * field.width + cell[1]
         path = np.empty(LONGEST, dtype=np.int64)
-        length = sample_walk(self.kind, self.params, start, field, rng, path)
+        length = call_drawing(rng, sample_walk, self.kind, self.params, start, field, path)
         if length == 0:
             row, col = divmod(field.station, field.width)
             raise RuntimeError(f"{self} did not find the goal at row {row}, column {col} within {LONGEST:,} steps")

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from legible_envs.support.compiled import kernel
+from legible_envs.support.random_kernels import Bits, below, normal, random, uniform
 from legible_envs.tabletop.design.validity_kernels import Room, Rules, make_room, obeys
 from legible_envs.tabletop.geometry.visibility_kernels import Floats
 
@@ -24,7 +25,7 @@ TRIES_PER_KIND = 50
 
 
 @kernel
-def sample_objects(genomes: Floats, rules: Rules, max_tries: int, rng: np.random.Generator) -> int:
+def sample_objects(bits: Bits, genomes: Floats, rules: Rules, max_tries: int) -> int:
     """Fill ``genomes [B, d]`` with random valid arrangements without obstacles, by rejecting whole arrangements.
 
     Every movable object draws its centre uniformly from the region; the first draw that obeys all rules is kept, so the
@@ -40,7 +41,7 @@ def sample_objects(genomes: Floats, rules: Rules, max_tries: int, rng: np.random
         found = False
         for _ in range(max_tries):
             for i in range(2 * len(rules.movable)):
-                genome[i] = rng.uniform(rules.lower[i], rules.upper[i])
+                genome[i] = uniform(bits, rules.lower[i], rules.upper[i])
             if obeys(genome, rules, room):
                 found = True
                 break
@@ -50,7 +51,7 @@ def sample_objects(genomes: Floats, rules: Rules, max_tries: int, rng: np.random
 
 
 @kernel
-def sample_obstacles(genomes: Floats, rules: Rules, max_tries: int, rng: np.random.Generator) -> None:
+def sample_obstacles(bits: Bits, genomes: Floats, rules: Rules, max_tries: int) -> None:
     """Lay random obstacles on ``genomes [B, d]`` that have none: 0 to all places, each number equally likely.
 
     Each is proposed as by :func:`add_obstacle` until the table is valid; a table that has no room for one more after
@@ -60,10 +61,10 @@ def sample_obstacles(genomes: Floats, rules: Rules, max_tries: int, rng: np.rand
     places = (genomes.shape[1] - 2 * len(rules.movable)) // 4
     before = np.empty(genomes.shape[1])
     for b in range(len(genomes)):
-        for _ in range(rng.integers(0, places + 1)):
+        for _ in range(below(bits, places + 1)):
             before[:] = genomes[b]
             for _ in range(max_tries):
-                add_obstacle(genomes[b], rules, room, rng)
+                add_obstacle(bits, genomes[b], rules, room)
                 if obeys(genomes[b], rules, room):
                     break
                 genomes[b] = before
@@ -97,28 +98,28 @@ def half_turn(angle: float) -> float:
 
 
 @kernel
-def change_objects(genome: Floats, rules: Rules, step_sd: float, rng: np.random.Generator) -> bool:
+def change_objects(bits: Bits, genome: Floats, rules: Rules, step_sd: float) -> bool:
     """Swap two objects, or move one or a few by a Gaussian step; False where the draw does not apply."""
     n = len(rules.movable)
-    if rng.random() < SWAP_SHARE:
-        i, j = rng.integers(0, n), rng.integers(0, n)
+    if random(bits) < SWAP_SHARE:
+        i, j = below(bits, n), below(bits, n)
         for axis in range(2):
             a, b = 2 * i + axis, 2 * j + axis
             genome[a], genome[b] = genome[b], genome[a]
         return i != j
     while True:
-        i = 2 * rng.integers(0, n)
-        genome[i] += rng.normal(0.0, step_sd)
-        genome[i + 1] += rng.normal(0.0, step_sd)
-        if rng.random() >= MORE_SHARE:
+        i = 2 * below(bits, n)
+        genome[i] += normal(bits, 0.0, step_sd)
+        genome[i + 1] += normal(bits, 0.0, step_sd)
+        if random(bits) >= MORE_SHARE:
             return True
 
 
 @kernel
-def add_obstacle(genome: Floats, rules: Rules, room: Room, rng: np.random.Generator) -> bool:
+def add_obstacle(bits: Bits, genome: Floats, rules: Rules, room: Room) -> bool:
     """Lay one more obstacle across the line between two random objects; False where there is no place for it."""
     n = len(rules.shapes)
-    i, j = rng.integers(0, n), rng.integers(0, n)
+    i, j = below(bits, n), below(bits, n)
     first = 2 * len(rules.movable)
     at = first + 4 * count_obstacles(genome, first)
     if i == j or at >= len(genome):
@@ -127,7 +128,7 @@ def add_obstacle(genome: Floats, rules: Rules, room: Room, rng: np.random.Genera
     for k in range(len(rules.movable)):
         points[rules.movable[k], 0] = genome[2 * k]
         points[rules.movable[k], 1] = genome[2 * k + 1]
-    share = rng.random()
+    share = random(bits)
     dx, dy = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1]
     genome[at] = 1.0
     genome[at + 1] = points[i, 0] + share * dx
@@ -137,35 +138,34 @@ def add_obstacle(genome: Floats, rules: Rules, room: Room, rng: np.random.Genera
 
 
 @kernel
-def change_obstacles(
-    genome: Floats, kind: int, rules: Rules, room: Room, step_sd: float, rng: np.random.Generator
-) -> bool:
+def change_obstacles(bits: Bits, genome: Floats, kind: int, rules: Rules, room: Room, step_sd: float) -> bool:
     """Add (``kind`` 0), remove (1), nudge (2) or turn (3) an obstacle; False where the draw does not apply."""
     if kind == 0:
-        return add_obstacle(genome, rules, room, rng)
+        return add_obstacle(bits, genome, rules, room)
     first = 2 * len(rules.movable)
     count = count_obstacles(genome, first)
     if count == 0:
         return False
-    at = first + 4 * rng.integers(0, count)
+    at = first + 4 * below(bits, count)
     if kind == 1:
         genome[at] = 0.0
         pack_obstacles(genome, first)
     elif kind == 2:
-        genome[at + 1] += rng.normal(0.0, step_sd)
-        genome[at + 2] += rng.normal(0.0, step_sd)
+        genome[at + 1] += normal(bits, 0.0, step_sd)
+        genome[at + 2] += normal(bits, 0.0, step_sd)
     else:
-        genome[at + 3] = half_turn(genome[at + 3] + rng.normal(0.0, TURN_SD))
+        genome[at + 3] = half_turn(genome[at + 3] + normal(bits, 0.0, TURN_SD))
     return True
 
 
 @kernel
 def perturb_genomes(
-    parents: Floats, k: int, what: int, rules: Rules, step_sd: float, rng: np.random.Generator, children: Floats
+    bits: Bits, parents: Floats, k: int, what: int, rules: Rules, step_sd: float, children: Floats
 ) -> None:
     """Write ``k`` valid children of each of ``parents [B, d]`` to ``children [B * k, d]``, grouped by parent.
 
     Args:
+        bits: Source of randomness.
         parents: Valid genomes.
         k: Children of each.
         what: ``OBJECTS``: two swap places (one child in five), or one or a few move: one, then with probability .35
@@ -174,7 +174,6 @@ def perturb_genomes(
             equally likely, then its place until the table is valid.
         rules: What is valid.
         step_sd: Standard deviation of a step in metres.
-        rng: Source of randomness.
         children: Out. A kind that finds no valid change in 50 draws is drawn anew; a parent of which no valid child is
             found in 1,000 draws repeats itself.
     """
@@ -186,13 +185,13 @@ def perturb_genomes(
             kind = 0
             for attempt in range(MAX_TRIES):
                 if attempt % TRIES_PER_KIND == 0:
-                    kind = int(rng.integers(0, 4))
+                    kind = below(bits, 4)
                 child[:] = parents[b]
                 pack_obstacles(child, first)
                 if what == OBJECTS:
-                    is_changed = change_objects(child, rules, step_sd, rng)
+                    is_changed = change_objects(bits, child, rules, step_sd)
                 else:
-                    is_changed = change_obstacles(child, kind, rules, room, step_sd, rng)
+                    is_changed = change_obstacles(bits, child, kind, rules, room, step_sd)
                 if is_changed and obeys(child, rules, room):
                     break
                 child[:] = parents[b]

@@ -15,6 +15,7 @@ from legible_envs.errors import LayoutError
 from legible_envs.key_space import KeySpace
 from legible_envs.observer import ObserverModel, Ties
 from legible_envs.rollouts.trajectory import Trajectory
+from legible_envs.support.random_bits import call_drawing
 from legible_envs.support.validation import choice, entries, flag, real, shown
 from legible_envs.tabletop.design import genome_kernels as kernels
 from legible_envs.tabletop.design import measures
@@ -243,9 +244,9 @@ class TabletopWorkspace(Workspace):
         arrays = self.rules.arrays
         if self.condition == "obstacles":
             genomes[first:] = self.rules.lower_bounds * (np.arange(self.genome_size) < 2 * len(self.rules.movable))
-            kernels.sample_obstacles(genomes[first:], arrays, kernels.MAX_TRIES, rng)
+            call_drawing(rng, kernels.sample_obstacles, genomes[first:], arrays, kernels.MAX_TRIES)
             return genomes
-        found = kernels.sample_objects(genomes[first:], arrays, MAX_SAMPLE_TRIES, rng)
+        found = call_drawing(rng, kernels.sample_objects, genomes[first:], arrays, MAX_SAMPLE_TRIES)
         if found < n - first:
             raise LayoutError(
                 f"no valid layout among {MAX_SAMPLE_TRIES:,} random ones: {len(self.rules.movable)} movable objects "
@@ -268,7 +269,7 @@ class TabletopWorkspace(Workspace):
             self.decode(parents[int(np.argmin(is_valid))])
         children = np.empty((len(parents) * k, self.genome_size))
         what = kernels.OBSTACLES if self.condition == "obstacles" else (kernels.OBJECTS, kernels.OBSTACLES)[phase]
-        kernels.perturb_genomes(parents, k, what, self.rules.arrays, self.step_sd, rng, children)
+        call_drawing(rng, kernels.perturb_genomes, parents, k, what, self.rules.arrays, self.step_sd, children)
         return children
 
     def valid(self, genomes: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:

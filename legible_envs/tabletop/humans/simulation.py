@@ -49,6 +49,7 @@ FASTEST_RATE: Final = 10_000.0
 """Samples per second."""
 _NO_BOXES: Final = np.empty((0, 6))
 _FARTHEST_BOW: Final = 0.5
+MOST_SAMPLES: Final = 1_000_000
 
 
 class _Route(NamedTuple):
@@ -378,6 +379,12 @@ def _reach(
     intent = _intend(surface, start, goal, person, rng)
     path = _trace(surface, intent, person, rng)
     skew = person.skew * math.exp(person.skew_trial * rng.standard_normal())
+    if not intent.duration * rate <= MOST_SAMPLES:
+        raise LayoutError(
+            f"a reach from {start!r} to {goal!r} takes {intent.duration:g} s: more than {MOST_SAMPLES:,} samples "
+            f"at {rate:g} per second",
+            rule="point",
+        )
     count = max(round(intent.duration * rate), 2) + 1
     states = np.empty((count, 2))
     sample_reach(

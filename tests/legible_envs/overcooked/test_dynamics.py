@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -273,6 +274,33 @@ def test_replay_names_the_array_that_does_not_fit():
         predict_transitions(layout, states, [[0], [0]])
     with pytest.raises(ValueError, match=r"0\.\.5"):
         predict_transitions(layout, states, [[0], [6]])
+
+
+@pytest.mark.parametrize(
+    ("name", "at", "value", "message"),
+    [
+        ("cells", (1, 0, 0), 5, "rows of `cells` must be integers 0..4, got 5 in state 1"),
+        ("cells", (1, 0, 1), -1, "columns of `cells` must be integers 0..6, got -1 in state 1"),
+        ("facing", (0, 0), 4, "`facing` must be integers 0..3, got 4 in state 0"),
+        ("held", (0, 0), 7, "`held` must be integers 0..6, got 7 in state 0"),
+        ("held", (0, 0), 120, "`held` must be integers 0..6, got 120 in state 0"),
+        ("counters", (1, 2, 3), -2, "`counters` must be integers 0..6, got -2 in state 1"),
+    ],
+)
+def test_replay_names_the_number_that_is_out_of_range(name, at, value, message):
+    """Kernels look up cells and orders by these numbers: without a check they read and wrote outside their arrays."""
+    layout = OvercookedLayout.from_ascii(ROOM)
+    states = GameArrays(
+        np.ones((2, 1, 2), int),
+        np.zeros((2, 1), int),
+        np.zeros((2, 1), int),
+        np.zeros((2, 5, 7), int),
+        np.zeros((2, 2, 5), int),
+    )
+    predict_transitions(layout, states, [[0], [0]])
+    getattr(states, name)[at] = value
+    with pytest.raises(ValueError, match=re.escape(message)):
+        predict_transitions(layout, states, [[0], [0]])
 
 
 PLAIN_PYTHON = """

@@ -204,8 +204,11 @@ def test_impossible_tasks():
         BoltzmannWalker().walk(shut, "serving", "tomato", rng)
     with pytest.raises(LayoutError, match="no station"):
         BoltzmannWalker().walk(OPEN, "pot", "fish", rng)
-    with pytest.raises(LayoutError, match="no floor"):
-        BoltzmannWalker().walk(OPEN, (0, 0), "onion", rng)
+    for start in [(0, 0), (1.5, 1), (-1, 1), (10**20, 1), (math.inf, 1), (math.nan, 1)]:
+        with pytest.raises(LayoutError, match="no floor"):
+            BoltzmannWalker().walk(OPEN, start, "onion", rng)
+        assert not OPEN.is_floor(start)
+        assert (OPEN.distances_from([start]) == -1).all()
     with pytest.raises(ValueError, match="`population` must be"):
         simulate_participants(OPEN, 1, rng, population="ghost")  # type: ignore[arg-type]
 

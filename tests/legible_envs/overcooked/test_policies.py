@@ -159,3 +159,12 @@ def test_plays_in_vector_environments(mode):
         assert not truncations.any()
     assert (delivered >= 3).all()
     envs.close()
+
+
+def test_an_info_of_another_kitchen_is_refused():
+    """Its goal lies outside the arrays of this kitchen, in which kernels look it up."""
+    env = gym.make("LegibleOvercooked-v0", disable_env_checker=True)
+    player = ScriptedPlayer(env, np.random.default_rng(0))
+    obs, info = env.reset(seed=0)
+    with pytest.raises(ValueError, match=r"its goal_mask has shape \(9, 9\), the kitchen \(7, 7\)"):
+        player(obs, {**info, "goal_mask": np.ones((9, 9), dtype=bool)})

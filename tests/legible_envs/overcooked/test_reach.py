@@ -24,6 +24,7 @@ from legible_envs.overcooked.scoring.boltzmann import HumanModel
 from legible_envs.overcooked.scoring.explanation import ambiguity, explain_layout, grid_graph, layout_distance
 from legible_envs.overcooked.scoring.explanation import score_layout as score_any
 from legible_envs.overcooked.trajectories import trajectories
+from legible_envs.rollouts.trajectory import Trajectory
 from legible_envs.tasks import Subtask, TaskGraph
 
 ONIONS = soup_task([("onion", "onion", "onion")])
@@ -45,6 +46,12 @@ SERVED = OvercookedLayout.from_rows(["XXOXX", "O1X2P", "D X S", "XXXXX"])
 """Player 1 fetches, player 2 cooks: nobody can do the task alone."""
 
 WALLED_IN = OvercookedLayout.from_rows(["XOXXXOX", "X  XX X", "XXOXXXX", "P 1   D", "X V   X", "XXXSXXX"])
+
+
+def walk_of(states: list[tuple[int, ...]], goal: str = next(iter(HALVES.stations))) -> Trajectory:
+    """A walk in the asymmetric kitchen."""
+    array = np.array(states, dtype=np.int64).reshape(len(states), -1 if states else 2)
+    return Trajectory(array, goal=goal, candidates=(goal,), layout=HALVES)
 
 
 # -- an oracle that knows nothing of reach -----------------------------------------------------------------------------
@@ -319,6 +326,12 @@ def test_a_player_without_a_start_is_refused_in_words(player) -> None:
         (lambda: score_any(HALVES, ONIONS, cell_costs=np.full((5, 9), math.nan)), "row 1, column 7 is nan"),
         (lambda: fit_rationality([3]), "expected trajectories, got 3 at index 0"),
         (lambda: fit_planner([]), "at least one trajectory, got none"),
+        (lambda: fit_planner([walk_of([])]), "1 trajectories have none"),
+        (lambda: fit_planner([walk_of([(1, 1), (10**6, 1)])]), "state 1, row 1000000, column 1, lies outside its 5x9"),
+        (lambda: fit_planner([walk_of([(1, 1), (1, -3)])]), "state 1, row 1, column -3, lies outside"),
+        (lambda: fit_rationality([walk_of([(1, 1), (1, 9)])]), "state 1, row 1, column 9, lies outside"),
+        (lambda: fit_rationality([walk_of([(1, 1, 1), (1, 2, 1)])]), "expected (row, col) cells, got states of shape"),
+        (lambda: fit_rationality([walk_of([(1, 1)], "moon")]), "trajectory 0: no station 'moon'; this kitchen has ["),
     ],
 )
 def test_other_arguments_are_refused_in_words(call, message: str) -> None:
