@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
-import zlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +10,8 @@ import numpy.typing as npt
 from ribs.archives import GridArchive
 
 from legible_envs.key_space import KeySpace
-from legible_envs.support.files import write_npz
+from legible_envs.support.files import open_npz, write_npz
+from legible_envs.support.stored_arrays import stored_array
 from legible_envs.workspace import Workspace
 from optimizers.errors import SearchError
 
@@ -136,20 +135,29 @@ def read_archive(path: Path) -> dict[str, npt.NDArray[Any]]:
 
     Raises:
         FileNotFoundError: There is no such file.
-        SearchError: The file is not such an archive.
+        OSError: It cannot be read.
+        SearchError: It is not such an archive: an array is missing, of another kind or shape than the others say, not
+            finite, or cells do not rise.
     """
     refusal = f"{path} is not an archive written by a search, or it is damaged"
     try:
-        with np.load(path, allow_pickle=False) as stored:
+        with open_npz(path) as stored:
             missing = [name for name in FIELDS if name not in stored]
             if missing:
                 raise SearchError(f"{refusal}: it lacks the arrays {missing}, it has {sorted(stored)}")
-            arrays = {name: stored[name] for name in FIELDS}
-    except FileNotFoundError:
+            objective = stored_array(stored, "objective", "f", (None,), finite=True)
+            rows = len(objective)
+            index = stored_array(stored, "index", "iu", (rows,))
+            if rows and (index[0] < 0 or (index[1:] <= index[:-1]).any()):
+                raise ValueError("`index` must hold numbers of cells from 0 on that rise")
+            arrays = {
+                "solution": stored_array(stored, "solution", "iuf", (rows, None), finite=True),
+                "objective": objective,
+                "measures": stored_array(stored, "measures", "iuf", (rows, None), finite=True),
+                "index": index,
+            }
+    except SearchError:
         raise
-    except (ValueError, KeyError, OSError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+    except ValueError as error:
         raise SearchError(f"{refusal}: {error}") from error
-    lengths = {name: len(values) for name, values in arrays.items()}
-    if len(set(lengths.values())) != 1:
-        raise SearchError(f"{refusal}: its arrays have different lengths {lengths}")
     return arrays

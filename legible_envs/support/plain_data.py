@@ -12,6 +12,7 @@ import math
 import re
 import tomllib
 from collections.abc import Callable, Hashable
+from datetime import date, time
 from typing import Any, Final
 
 import yaml
@@ -23,6 +24,7 @@ __all__ = [
     "MOST_CHARACTERS_OF_TOML",
     "MOST_CHARACTERS_OF_YAML",
     "MOST_ENTRIES_OF_YAML",
+    "check_plain",
     "parse_json",
     "parse_toml",
     "parse_yaml",
@@ -45,15 +47,16 @@ _LEVELS: Final = 100
 _LONG_KEY: Final = re.compile(r"(?:[\w\"'-]++[ \t]*+\.[ \t]*+){100}")
 
 
-def parse_json(text: str, *, finite: bool = True) -> Any:
+def parse_json(text: str, *, finite: bool = True, most: int = MOST_CHARACTERS) -> Any:
     """Read JSON.
 
     Args:
         text: The whole text.
         finite: Whether NaN and infinities, which Python writes as ``NaN`` and ``Infinity``, are refused.
+        most: How many characters it may have.
 
     Raises:
-        ValueError: It is not JSON; longer than :data:`MOST_CHARACTERS`; nested more than 100 levels deep; a key stands
+        ValueError: It is not JSON; longer than ``most``; nested more than 100 levels deep; a key stands
             twice in one mapping, or a number is not finite or longer than 128 bits. Says where.
 
     Example:
@@ -63,7 +66,7 @@ def parse_json(text: str, *, finite: bool = True) -> Any:
         Traceback (most recent call last):
         ValueError: `size[1]` must be a finite number, got inf
     """
-    _check_length(text, MOST_CHARACTERS, "JSON")
+    _check_length(text, most, "JSON")
     return _checked("JSON", lambda: json.loads(text, object_pairs_hook=_without_repeats), finite=finite)
 
 
@@ -107,7 +110,7 @@ def _checked(kind: str, parse: Callable[[], Any], *, finite: bool = True) -> Any
         raise ValueError(f"not valid {kind}: {' '.join(str(error).split())}") from error
     except RecursionError as error:
         raise _too_deep() from error
-    _check_values(data, finite=finite)
+    check_plain(data, finite=finite)
     return data
 
 
@@ -119,8 +122,12 @@ def _too_deep() -> ValueError:
     return _RefusedError(f"it is nested too deeply; at most {_LEVELS} levels are read")
 
 
-def _check_values(data: Any, *, finite: bool) -> None:
-    """Refuse values that are no plain data, wherever they stand.
+def check_plain(data: Any, *, finite: bool = True) -> None:
+    """Refuse values that are no plain data, wherever they stand in lists and dictionaries.
+
+    Args:
+        data: Any data; that of a program goes through :func:`~legible_envs.support.models.as_plain` first.
+        finite: Whether NaN and infinities are refused.
 
     Raises:
         ValueError: There is one; names it by keys and positions from 0.
@@ -139,7 +146,11 @@ def _check_values(data: Any, *, finite: bool) -> None:
             if isinstance(value, dict | list):
                 waiting.append((value, (*path, key)))
             elif (wanted := _wanted_instead(value, finite)) is not None:
-                raise ValueError(f"{_where((*path, key)[1:])} must be {wanted}, got {shown(value)}")
+                raise ValueError(f"{_where((*path, key)[1:])} must be {wanted}, got {_shown(value)}")
+
+
+def _shown(value: Any) -> str:
+    return f"the date or time {value}" if isinstance(value, date | time) else shown(value)
 
 
 def _wanted_instead(value: Any, finite: bool) -> str | None:

@@ -289,7 +289,7 @@ def test_files_of_others_are_refused(on_reaches: NeuralPredictor, tmp_path: Path
         ("schema", {"schema": 99}),
         ("fit its parameters", {"weights/out": np.zeros((1, 1, 1))}),
         ("not finite", {"weights/out": np.full_like(arrays["weights/out"], np.nan)}),
-        ("Object arrays", {"weights/out": np.array([{}], dtype=object)}),
+        ("pickled objects", {"weights/out": np.array([{}], dtype=object)}),
     ):
         np.savez(tmp_path / "bad.npz", **{**arrays, **changes})
         with pytest.raises(ValueError, match=name if name != "kind" else "not a file of a neural"):
