@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from legible_envs.support.plain_data import parse_json
+from legible_envs.support.text import read_text
 from optimizers.errors import SearchError
 
 if TYPE_CHECKING:
@@ -89,14 +90,18 @@ def _folder_of(run: SearchResult) -> Path:
 def listed(folder: Path) -> dict[str, str]:
     """Conditions searched together, each with its folder; empty where there is one only."""
     try:
-        data = json.loads((folder / LIST).read_text(encoding="utf-8"))
+        data = parse_json(read_text(folder / LIST))
     except FileNotFoundError:
         return {}
     except ValueError as error:
         raise SearchError(f"{folder / LIST} is not valid JSON: {error}") from error
-    if not isinstance(data, dict) or not set(data) <= set(CONDITIONS):
+    if not isinstance(data, dict) or not set(data) <= set(CONDITIONS) or not all(map(_is_name, data.values())):
         raise SearchError(f"{folder / LIST} must map conditions {list(CONDITIONS)} to folders")
-    return {str(key): str(value) for key, value in data.items()}
+    return dict(data)
+
+
+def _is_name(value: object) -> bool:
+    return isinstance(value, str) and bool(value)
 
 
 def beta_of(workspace: Any) -> float:

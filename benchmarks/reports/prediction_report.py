@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any, Final
 from benchmarks.reports.experiment_report import write_tables
 from benchmarks.reports.pages import page_environment, table_of
 from legible_envs.support.files import write_text
+from legible_envs.support.plain_data import parse_json
+from legible_envs.support.text import read_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -297,10 +299,11 @@ def evaluation_section(folder: Path) -> str | None:
 
     Figures become images within the page, so that no script in their files can run.
     """
+    from benchmarks.reports.prediction_file import EvaluationContent
+    from legible_envs.support.models import validated
+
     try:
-        about = json.loads((folder / _FILE).read_text(encoding="utf-8"))
-        if about["schema"] != 1:
-            return None
+        about = validated(EvaluationContent, parse_json(read_text(folder / _FILE)))
         figures = [
             (name, _FIGURES[name], _as_image(folder / f"{name}.svg"))
             for name in _FIGURES
@@ -310,10 +313,10 @@ def evaluation_section(folder: Path) -> str | None:
         return template.render(
             about=about,
             figures=figures,
-            summary=table_of([("", about["summary"])], 3),
-            comparisons=[(each, table_of([("", _in_words(each["pairs"]))], 3)) for each in about["comparisons"]],
+            summary=table_of([("", about.summary)], 3),
+            comparisons=[(each, table_of([("", _in_words(each.pairs))], 3)) for each in about.comparisons],
         )
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError):
         return None
 
 

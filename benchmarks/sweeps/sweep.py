@@ -246,4 +246,3 @@ def _label(settings: Mapping[str, Any], key: str) -> str:
         if name != key
     )
     return " ".join((settings[key], *shown))
-

@@ -212,11 +212,23 @@ def test_messages_about_files_begin_with_their_path(tmp_path):
         (lambda: TaskGraph.from_yaml("start: [unclosed"), "not valid YAML"),
         (lambda: TaskGraph.from_yaml("just text"), "must be a mapping"),
         (lambda: TaskGraph.from_dict({"start": "s"}), "the task lacks the key `subtasks`"),
-        (lambda: TaskGraph.from_dict({"start": "s", "subtasks": [{"name": "a", "goals": "x", "befor": []}]}), "'befor'; known: name"),
+        (
+            lambda: TaskGraph.from_dict({"start": "s", "subtasks": [{"name": "a", "goals": "x", "befor": []}]}),
+            "'befor'; known: name",
+        ),
         (lambda: TaskGraph.from_dict({"start": "s", "subtasks": "a"}), "`subtasks` must be a list, got 'a'"),
-        (lambda: TaskGraph.from_dict(TASK | {"groups": {"g": -1}}), "`groups.g` must be a text or a list of texts, got -1"),
-        (lambda: TaskGraph.from_dict({"start": "s", "subtasks": [{"name": None, "goals": "x"}]}), "lacks the key `name`"),
-        (lambda: TaskGraph.from_dict({"start": "s", "subtasks": [{"name": "a", "goals": 0}]}), r"`subtasks\[0\].goals`"),
+        (
+            lambda: TaskGraph.from_dict(TASK | {"groups": {"g": -1}}),
+            "`groups.g` must be a text or a list of texts, got -1",
+        ),
+        (
+            lambda: TaskGraph.from_dict({"start": "s", "subtasks": [{"name": None, "goals": "x"}]}),
+            "lacks the key `name`",
+        ),
+        (
+            lambda: TaskGraph.from_dict({"start": "s", "subtasks": [{"name": "a", "goals": 0}]}),
+            r"`subtasks\[0\].goals`",
+        ),
         (
             lambda: TaskGraph.from_dict({"start": "s", "subtasks": [{"name": "a", "goals": "x", "count": 10**200}]}),
             r"`subtasks\[0\].count` must be an integer from 1 to 1000, got 1000",

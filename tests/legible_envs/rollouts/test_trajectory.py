@@ -150,7 +150,10 @@ def test_unreadable_files_are_refused_in_words(tmp_path: Path) -> None:
         ({"schema": 99}, "schema 99"),
         ({"kind": "cake"}, "it looks like an .npz with the arrays .*; expected"),
         ({"offsets": np.array([0, 5])}, "`offsets` must rise from 0 to the number of states, 2"),
-        ({"offsets": np.array([0, 2, 2])}, r"`offsets` must be whole numbers of shape \(2\), got int64 of shape \(3,\)"),
+        (
+            {"offsets": np.array([0, 2, 2])},
+            r"`offsets` must be whole numbers of shape \(2\), got int64 of shape \(3,\)",
+        ),
         ({"times": np.array(0.0)}, r"`times` must be numbers of shape \(2\), got float64 of shape \(\)"),
         ({"times": np.array([0.0, np.nan])}, r"`times` must be finite, got nan at \[1\]"),
         ({"states": np.zeros(2)}, r"`states` must be numbers of shape \(any, any\), got float64 of shape \(2,\)"),

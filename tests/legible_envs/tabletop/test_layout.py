@@ -149,7 +149,10 @@ def test_overlap_of_oriented_rectangles_against_shapely():
         ({"objects": None}, "`objects`"),
         ({"colour": "red"}, "colour"),
         ({"objects": [{"name": "a"}]}, r"`objects\[0\]` lacks the key `at`"),
-        ({"objects": [{"name": "a", "at": [0.1, 0.2], "weight": 3}]}, r"`objects\[0\]` has the unknown key 'weight'; known: n"),
+        (
+            {"objects": [{"name": "a", "at": [0.1, 0.2], "weight": 3}]},
+            r"`objects\[0\]` has the unknown key 'weight'; known: n",
+        ),
         ({"objects": [{"name": "a", "at": [0.1, "x"]}]}, r"`objects\[0\].at\[1\]` must be a finite number"),
         ({"objects": [{"name": "a", "at": [0.1, float("nan")]}]}, r"`objects\[0\].at\[1\]` must be a finite number"),
         ({"objects": [{"name": "a", "at": [0.1, 0.2], "size": [0, 1]}]}, r"`objects\[0\].size\[0\]` must be a finite"),
