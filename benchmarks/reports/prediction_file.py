@@ -32,7 +32,7 @@ def _alike(name: str, value: object) -> object:
     return value
 
 
-Rows = Annotated[list[Row], Length(0, _MOST_ROWS), Checked(_alike)]
+Rows = Annotated[list[Row], Length(1, _MOST_ROWS), Checked(_alike)]
 
 
 class ComparisonEntry(FileModel):

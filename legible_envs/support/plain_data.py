@@ -44,7 +44,7 @@ MOST_ENTRIES_OF_YAML: Final = 100_000
 
 _BITS: Final = 128  # seeds may be that long
 _LEVELS: Final = 100
-_LONG_KEY: Final = re.compile(r"(?:[\w\"'-]++[ \t]*+\.[ \t]*+){100}")
+_LONG_KEY: Final = re.compile(r"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){100}")
 
 
 def parse_json(text: str, *, finite: bool = True, most: int = MOST_CHARACTERS) -> Any:

@@ -371,7 +371,8 @@ def use_evaluation(path: Path) -> None:
     from benchmarks.reports.prediction_report import evaluation_section
 
     path.rename(path.with_name("reading.json"))
-    assert isinstance(evaluation_section(path.parent), str | None)
+    if evaluation_section(path.parent) is None:
+        raise ValueError("a report leaves it out")
 
 
 def _formats() -> dict[str, Callable[[], Format]]:
@@ -418,7 +419,7 @@ def _formats() -> dict[str, Callable[[], Format]]:
         "archive npz": lambda: Format(".npz", (archive,), None, use_archive, (SearchError,)),
         "network npz": lambda: Format(".npz", (network(),), None, use_network, inner=("config",)),
         "sweep TOML": lambda: Format(".toml", (SWEEP,), as_toml, use_sweep, (SweepError,)),
-        "evaluation JSON": lambda: Format(".json", (EVALUATION,), _json, use_evaluation, ()),
+        "evaluation JSON": lambda: Format(".json", (EVALUATION,), _json, use_evaluation),
     }
 
 
