@@ -1,4 +1,8 @@
-"""Output of the command line: kitchens and tables in colour, and rows of numbers."""
+"""Output of the command line: kitchens and tables in colour, and rows of numbers.
+
+Names in what is printed come from strangers. Nothing that is printed through :func:`say` or :func:`tell` is markup, and
+characters that steer a terminal or are not seen are written out (:func:`legible_envs.support.names.printable`).
+"""
 
 from __future__ import annotations
 
@@ -6,7 +10,10 @@ import math
 import os
 from collections.abc import Sequence
 from decimal import ROUND_HALF_UP, Context, Decimal
+from functools import cache
 from typing import TYPE_CHECKING, Any
+
+from legible_envs.support.names import printable
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
@@ -16,7 +23,7 @@ if TYPE_CHECKING:
     from legible_envs.overcooked.layout import OvercookedLayout
     from legible_envs.tabletop import TabletopLayout
 
-__all__ = ["kitchen_text", "number", "plural", "say", "table", "table_text"]
+__all__ = ["kitchen_text", "number", "plural", "say", "table", "table_text", "tell"]
 
 _PLAIN = {"X": "##", "V": "[]", " ": "  "}
 _FANCY = {"X": "▒▒", "V": "[]", " ": "  "}
@@ -27,10 +34,45 @@ def say() -> Console:
 
     ``COLUMNS`` sets another width.
     """
-    from rich.console import Console
+    console = _console_class()(**_PLAIN_TEXT)
+    return console if console.is_terminal or "COLUMNS" in os.environ else _console_class()(**_PLAIN_TEXT, width=120)
 
-    console = Console(highlight=False, soft_wrap=False)
-    return console if console.is_terminal or "COLUMNS" in os.environ else Console(highlight=False, width=120)
+
+def tell(text: str, *, err: bool = False) -> None:
+    """Print lines of text to standard output, or to standard error."""
+    import click
+
+    click.echo(printable(text, lines=True), err=err)
+
+
+_PLAIN_TEXT: Any = {"markup": False, "emoji": False, "highlight": False, "soft_wrap": False}
+
+
+@cache
+def _console_class() -> type[Console]:
+    """Rich's console, but that no text in whatever it prints reaches the terminal as more than text."""
+    from rich.console import Console
+    from rich.segment import Segment
+
+    class SafeConsole(Console):
+        def render(self, *args: Any, **kwargs: Any) -> Any:
+            for segment in super().render(*args, **kwargs):
+                if segment.control or segment.text.isprintable() or segment.text == "\n":
+                    yield segment
+                else:
+                    yield Segment(printable(segment.text, lines=True), segment.style)
+
+        def status(self, status: Any, **options: Any) -> Any:
+            return super().status(_line(status), **options)
+
+    return SafeConsole
+
+
+def _line(text: Any) -> Any:
+    """A text that rich, which reads markup in some places whatever its console says, takes as it is."""
+    from rich.text import Text
+
+    return Text(printable(text)) if isinstance(text, str) else text
 
 
 def kitchen_text(console: Console, layout: OvercookedLayout) -> Text:
@@ -65,6 +107,7 @@ def _ink(ground: str) -> str:
 
 _ON_TOP = {"circle": "●", "triangle": "▲", "square": "■", "star": "★", "diamond": "◆", "heart": "♥", "plus": "✚"}
 _COLUMN, _LINE = 0.02, 0.04  # metres of a character of a table
+_WIDEST = 240  # characters; larger tables are drawn to a smaller scale
 
 
 def table_text(console: Console, layout: TabletopLayout) -> Text:
@@ -79,11 +122,14 @@ def table_text(console: Console, layout: TabletopLayout) -> Text:
 
     fancy = console.encoding.lower().startswith("utf")
     width, depth = layout.table.size
-    columns, lines = round(width / _COLUMN), round(depth / _LINE)
-    cells = [[(" ", f"on {_ground(layout, c, lines - 1 - r)}") for c in range(columns)] for r in range(lines)]
+    coarse = max(1.0, width / _COLUMN / _WIDEST, depth / _LINE / _WIDEST)
+    across, up = _COLUMN * coarse, _LINE * coarse
+    columns, lines = max(1, round(width / across)), max(1, round(depth / up))
+    grounds = [[_ground(layout, (c + 0.5) * across, (r + 0.5) * up) for c in range(columns)] for r in range(lines)]
+    cells = [[(" ", f"on {ground}") for ground in row] for row in reversed(grounds)]
 
     def put(x: float, y: float, text: str, style: str) -> None:
-        row, column = lines - 1 - int(min(y / _LINE, lines - 1)), round(x / _COLUMN - len(text) / 2)
+        row, column = lines - 1 - int(min(y / up, lines - 1)), round(x / across - len(text) / 2)
         for i, symbol in enumerate(text):
             if 0 <= column + i < columns and 0 <= row < lines:
                 cells[row][column + i] = symbol, style
@@ -94,9 +140,9 @@ def table_text(console: Console, layout: TabletopLayout) -> Text:
         for x, y in _along(obstacle.at, obstacle.angle, obstacle.size[0]):
             put(x, y, "▒" if fancy else "#", f"{TABLE['obstacle_edge']} on {TABLE['obstacle']}")
     for box in layout.objects:
-        colour, letter = hex_of(box.colour), box.shape[0].upper()
+        colour, letter = hex_of(box.colour), _initial(box.shape).upper()
         symbol = _ON_TOP.get(box.shape, letter) if fancy else letter
-        put(*box.at, f"{symbol}{box.colour[0]}", f"bold {_ink(colour)} on {colour}")
+        put(*box.at, f"{symbol}{_initial(box.colour)}", f"bold {_ink(colour)} on {colour}")
     text = Text(no_wrap=True)
     for i, line in enumerate(cells):
         text.append("\n" if i else "")
@@ -105,11 +151,18 @@ def table_text(console: Console, layout: TabletopLayout) -> Text:
     return text
 
 
-def _ground(layout: TabletopLayout, column: int, line: int) -> str:
-    """The colour under a character."""
+def _initial(name: str) -> str:
+    """The first character of a name, where that is one character wide on the map; else a question mark."""
+    from rich.cells import cell_len
+
+    first = name[:1]
+    return first if first.isprintable() and cell_len(first.upper()) == 1 == cell_len(first) else "?"
+
+
+def _ground(layout: TabletopLayout, x: float, y: float) -> str:
+    """The colour of the table at a point."""
     from legible_envs.tabletop.rendering.palette import TABLE
 
-    x, y = (column + 0.5) * _COLUMN, (line + 0.5) * _LINE
     for name in ("region", "assembly"):
         x0, y0, x1, y1 = getattr(layout.table, name)
         if x0 <= x <= x1 and y0 <= y <= y1:
@@ -134,18 +187,17 @@ def table(rows: Sequence[dict[str, Any]]) -> Table:
     shown = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for name in rows[0] if rows else ():
         numeric = all(isinstance(row[name], int | float) for row in rows)
-        shown.add_column(name.replace("_", " "), justify="right" if numeric else "left", overflow="fold")
+        heading = _line(name.replace("_", " "))
+        shown.add_column(heading, justify="right" if numeric else "left", overflow="fold")
     for row in rows:
         shown.add_row(*(_text(value) for value in row.values()))
     return shown
 
 
 def _text(value: Any) -> str | RenderableType:
-    from rich.text import Text
-
     if isinstance(value, float):
         return number(value, 3 if abs(value) < 10 else 1)
-    return Text(str(value))
+    return _line(str(value))  # type: ignore[no-any-return]
 
 
 def number(value: float | None, digits: int = 2) -> str:

@@ -5,11 +5,9 @@ from __future__ import annotations
 from typing import Annotated, Final
 
 from legible_envs.support.models import Length, OneOrMore, Text, Whole, YamlModel
+from legible_envs.task_states import MAX_SUBTASKS
 
-__all__ = ["MOST_COPIES", "MOST_NAMES", "MOST_SUBTASKS", "SubtaskEntry", "TaskContent"]
-
-MOST_SUBTASKS: Final = 256
-"""Subtasks of a task."""
+__all__ = ["MOST_COPIES", "MOST_NAMES", "SubtaskEntry", "TaskContent"]
 
 MOST_COPIES: Final = 1000
 """Interchangeable copies of a subtask."""
@@ -35,6 +33,6 @@ class TaskContent(YamlModel):
     """A task; see :class:`~legible_envs.tasks.TaskGraph`."""
 
     start: Name
-    subtasks: Annotated[list[SubtaskEntry], Length(1, MOST_SUBTASKS)]
-    groups: Annotated[dict[str, Names], Length(0, MOST_SUBTASKS)] = {}
+    subtasks: Annotated[list[SubtaskEntry], Length(1, MAX_SUBTASKS)]
+    groups: Annotated[dict[str, Names], Length(0, MAX_SUBTASKS)] = {}
     max_open: Annotated[int, Whole(1)] | None = None

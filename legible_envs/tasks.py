@@ -18,9 +18,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from legible_envs.errors import TaskError
+from legible_envs.support.names import is_whole
 from legible_envs.support.text import dump_yaml, read_source
 from legible_envs.support.validation import entries, integer, shown
-from legible_envs.task_states import StateSpace, SubtaskClass
+from legible_envs.task_states import MAX_SUBTASKS, StateSpace, SubtaskClass
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -52,8 +53,8 @@ class Subtask:
         for attribute in ("goals", "after", "then"):
             value = getattr(self, attribute)
             object.__setattr__(self, attribute, _names(f"subtask {self.name!r}: `{attribute}`", value))
-        if not isinstance(self.name, str) or not self.name:
-            raise TaskError(f"a subtask needs a non-empty name, got {self.name!r}")
+        if not isinstance(self.name, str) or not self.name or not is_whole(self.name):
+            raise TaskError(f"a subtask needs a non-empty name of whole characters, got {self.name!r}")
         if not self.goals:
             raise TaskError(f"subtask {self.name!r} has no goals; give at least one")
         if len(set(self.goals)) != len(self.goals):
@@ -110,7 +111,8 @@ class TaskGraph:
         max_open: How many groups may be in progress at once (``pots=1`` is ``max_open=1``); None means no limit.
 
     Raises:
-        TaskError: Duplicate or unknown names, a cycle (named), overlapping groups, or no valid sequence at all.
+        TaskError: Duplicate or unknown names, a cycle (named), overlapping groups, no valid sequence at all, or more
+            than 128 subtasks, 131,072 ways to have done some of them, or a million steps between task states.
 
     Example:
         >>> task = TaskGraph([Subtask("first", ("red",)), Subtask("second", ("blue",), after=("first",))], start="home")
@@ -131,6 +133,10 @@ class TaskGraph:
         max_open: int | None = None,
     ) -> None:
         listed = entries(subtasks)
+        if len(listed) > MAX_SUBTASKS:
+            raise TaskError(
+                f"a task has at most {MAX_SUBTASKS} subtasks, got {len(listed):,}; `count` repeats one of them"
+            )
         for number, subtask in enumerate(listed, 1):
             if not isinstance(subtask, Subtask):
                 raise TaskError(f"entry {number} of `subtasks` must be a Subtask, got {shown(subtask)}")
@@ -156,7 +162,7 @@ class TaskGraph:
     def _check_names(self) -> None:
         if not self.subtasks:
             raise TaskError("a task needs at least one subtask; `subtasks` must be a list of Subtask")
-        if not isinstance(self.start, str) or not self.start:
+        if not isinstance(self.start, str) or not self.start or not is_whole(self.start):
             raise TaskError(f"`start` must name a place, got {self.start!r}")
         names = [s.name for s in self.subtasks]
         repeated = sorted({n for n in names if names.count(n) > 1})
@@ -365,6 +371,6 @@ def _names(what: str, value: object) -> tuple[str, ...]:
     """Names in a list, or a single one."""
     names = [value] if isinstance(value, str) else entries(value)
     empty_is_meant = isinstance(value, Iterable) and not isinstance(value, str | bytes | Mapping)
-    if not all(isinstance(name, str) and name for name in names) or not (names or empty_is_meant):
+    if not all(isinstance(name, str) and name and is_whole(name) for name in names) or not (names or empty_is_meant):
         raise TaskError(f"{what} must hold non-empty names, got {shown(value)}")
     return tuple(names)

@@ -409,13 +409,26 @@ def as_single(genome: npt.ArrayLike, size: int) -> npt.NDArray[Any]:
     return array[None]
 
 
-def check_draws(rng: np.random.Generator, **counts: int) -> None:
-    """Check what random genomes are drawn by: a generator, and how many.
+MOST_GENOMES: Final = 1_000_000
+"""Genomes of one call that draws some; more are drawn by several calls."""
+MOST_NUMBERS: Final = 2**27
+"""Numbers in all genomes of one call, which take up to a gibibyte."""
+
+
+def check_draws(rng: np.random.Generator, *, size: int = 1, parents: int = 1, **counts: int) -> None:
+    """Check what random genomes are drawn by: a generator, and how many; before any room is made for them.
+
+    Args:
+        rng: The generator.
+        size: Numbers in a genome.
+        parents: For how many genomes so many are drawn.
+        counts: How many, by the name of the argument.
 
     Raises:
-        ValueError: A count is no whole number >= 0, or ``rng`` is no numpy Generator.
+        ValueError: A count is no whole number from 0 to what one call may draw, or ``rng`` is no numpy Generator.
     """
+    most = min(MOST_GENOMES, MOST_NUMBERS // max(1, size)) // max(1, parents)
     for name, count in counts.items():
-        integer(name, count, 0)
+        integer(name, count, 0, most)
     if not isinstance(rng, np.random.Generator):
         raise ValueError(f"`rng` must be a numpy random Generator such as np.random.default_rng(0), got {shown(rng)}")

@@ -34,7 +34,7 @@ class Progress:
 
             self._bar = RichProgress(
                 BarColumn(bar_width=None),
-                TextColumn("{task.percentage:3.0f}%{task.fields[unit]} {task.fields[status]}"),
+                TextColumn("{task.percentage:3.0f}%{task.fields[unit]} {task.fields[status]}", markup=False),
                 TimeRemainingColumn(compact=True),
                 console=Console(stderr=True),
                 refresh_per_second=5,

@@ -15,7 +15,7 @@ import numpy as np
 
 from legible_envs.key_space import KeySpace
 from legible_envs.support.validation import choice, entries, integer, integers, is_integer, real, shown
-from legible_envs.workspace import Workspace
+from legible_envs.workspace import MOST_GENOMES, Workspace
 from optimizers.emitters.registry import EmitterSpec
 from optimizers.errors import SearchInterrupted
 from optimizers.evaluator import Evaluator, Objective
@@ -201,9 +201,13 @@ def _check_budget(
     integers(1, evaluations=evaluations)
     if iterations is not None:
         counts = entries(iterations)
-        if len(counts) != 2 or not all(map(is_integer, counts)) or counts[0] < 1 or counts[1] < 0:
-            raise ValueError(f"`iterations` must be (random layouts >= 1, climbs >= 0), got {shown(iterations)}")
-    integer("initial", initial, 1)
+        if len(counts) != 2 or not all(map(is_integer, counts)) or not 1 <= counts[0] <= MOST_GENOMES or counts[1] < 0:
+            raise ValueError(
+                f"`iterations` must be (random layouts >= 1, at most {MOST_GENOMES:,}; climbs >= 0), got "
+                f"{shown(iterations)}"
+            )
+        integer("a number in `iterations`", counts[1], 0)
+    integer("initial", initial, 1, MOST_GENOMES)
     choice("resume", resume, (True, False, "auto"))
     if resume and checkpoint is None:
         raise ValueError("resume needs checkpoint=, the folder of the run")

@@ -22,6 +22,7 @@ from benchmarks.cli.options import (
 from benchmarks.cli.program import STOPPED, Commands, Program
 from benchmarks.cli.reproduce import reproduce
 from benchmarks.cli.sweep import sweep
+from benchmarks.console import tell
 from legible_envs import __version__
 
 __all__ = ["main"]
@@ -98,7 +99,7 @@ main.add_command(reproduce)
 @click.option("--emitter-option", "emitter_options", multiple=True, type=Assignment(), metavar="NAME=VALUE",
               help="An option of the emitter, such as sigma=0.5; repeatable.")  # fmt: skip
 @click.option("--evaluations", type=click.IntRange(min=1), help="Layouts to score. [default: 200000]")
-@click.option("--iterations", nargs=2, type=click.IntRange(0, 10_000_000), metavar="RANDOM CLIMBS",
+@click.option("--iterations", nargs=2, type=click.IntRange(0, 1_000_000), metavar="RANDOM CLIMBS",
               help="The paper's budget instead: random layouts, then climbs, each to its end.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 @click.option(
@@ -151,7 +152,7 @@ def report(run: Path) -> None:
     from benchmarks.cli.optimize import write_pictures
 
     check_folder(run)
-    click.echo(f"report: {click.format_filename(write_pictures(run)['report'])}")
+    tell(f"report: {click.format_filename(write_pictures(run)['report'])}")
 
 
 @main.command()
@@ -183,8 +184,8 @@ def workspaces() -> None:
               help="Evaluate this predictor by cross-validation; repeatable.")  # fmt: skip
 @click.option("--cut", type=click.Choice(["steps", "cells", "time", "arc"]), default="steps", show_default=True,
               help="The quantity that fractions observed refer to.")  # fmt: skip
-@click.option("--folds", type=click.IntRange(min=2), default=4, show_default=True, help="Of the cross-validation.")
-@click.option("--repeats", type=click.IntRange(min=1), default=3, show_default=True, help="Of the cross-validation.")
+@click.option("--folds", type=click.IntRange(2, 1_000), default=4, show_default=True, help="Of the cross-validation.")
+@click.option("--repeats", type=click.IntRange(1, 1_000), default=3, show_default=True, help="Of the cross-validation.")
 @click.option("--by-participant", is_flag=True, help="Evaluate on participants whom it did not learn from.")
 @click.option("--keep-rare", is_flag=True, help="Keep goals with fewer examples than folds.")
 @click.option("--curve/--no-curve", default=True, show_default=True, help="Draw a learning curve.")
@@ -230,7 +231,7 @@ def score(
         check_folder(folder, "--out")
     recorded = None if trajectories is None else trajectories_in(design, trajectories)
     for line in score_lines(design):
-        click.echo(line)
+        tell(line)
     if recorded is None:
         return
     from benchmarks.console import say
@@ -243,7 +244,7 @@ def score(
     results = evaluate_trajectories(recorded, predictors, groups="participant" if by_participant else None, **settings)
     print_evaluation(say(), results)
     for line in save_evaluation(results, layout, out):
-        click.echo(line)
+        tell(line)
 
 
 @main.command()
@@ -286,9 +287,9 @@ def play(layout: str, fps: int, record: Path | None) -> None:
 
     kitchen = load_kitchen(layout)
     played = play_layout(kitchen.layout, recipes=kitchen.soups, fps=fps, record=record)
-    click.echo(f"{plural(len(played.actions), 'step')}, reward {played.rewards.sum():g}")
+    tell(f"{plural(len(played.actions), 'step')}, reward {played.rewards.sum():g}")
     if record is not None and len(played.actions):
-        click.echo(f"recorded: {click.format_filename(record)}")
+        tell(f"recorded: {click.format_filename(record)}")
     if played.interrupted:
         raise click.exceptions.Exit(STOPPED)
 
@@ -312,7 +313,7 @@ def fetch(source: Path | None, out: Path | None) -> None:
     """
     from legible_envs.datasets.overcooked_2019 import fetch_recordings
 
-    click.echo(f"recordings: {fetch_recordings(out, source=source)}")
+    tell(f"recordings: {fetch_recordings(out, source=source)}")
 
 
 @humans.command()

@@ -87,8 +87,8 @@ def run_demo(
         rows_of_table = [dict(zip(people["table"]["columns"], row, strict=True)) for row in people["table"]["rows"]]
         console.print("Recorded participants: goals predicted correctly", style="bold")
         console.print(table(rows_of_table))
-    console.print(people["note"], style="dim")
-    console.print(f"\npicture {image}\nreport  {page}")
+    console.print(people["note"], style="dim", markup=False)
+    console.print(f"\npicture {image}\nreport  {page}", markup=False)
     return page
 
 

@@ -23,7 +23,7 @@ __all__ = ["evaluate", "evaluate_predictors"]
               help="A file of real pointing (.csv.gz): evaluate predictors of reaches on it too.")  # fmt: skip
 @click.option("--neural/--no-neural", default=None, help="Evaluate networks too. [default: where torch is installed]")
 @click.option("--layout", "layouts", multiple=True, metavar="NAME", help="Only this kitchen; repeatable.")
-@click.option("--repeats", type=click.IntRange(min=1), default=3, show_default=True, help="Of the cross-validation.")
+@click.option("--repeats", type=click.IntRange(1, 1_000), default=3, show_default=True, help="Of the cross-validation.")
 @click.option("--out", type=DestinationFolder(), help="Folder to write tables to.")
 def evaluate(
     folder: Path | None,
@@ -119,6 +119,7 @@ def _networks_wanted(neural: bool | None, notes: list[str]) -> bool:
 
 def _print(console: Console, name: str, scores: pd.DataFrame, out: Path | None) -> None:
     from benchmarks.console import plural, table
+    from benchmarks.csv_tables import write_table
     from benchmarks.experiments.prediction.analysis import accuracy_table, reference_rows, to_markdown
 
     rows = reference_rows(scores)
@@ -131,5 +132,5 @@ def _print(console: Console, name: str, scores: pd.DataFrame, out: Path | None) 
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
         (out / f"{name}.md").write_text(f"{to_markdown(rows)}\n{counts}; {about}.\n", encoding="utf-8")
-        accuracy_table(scores).to_csv(out / f"{name}.csv", index=False)
-        console.print(f"tables: {out / name}.md, {out / name}.csv")
+        write_table(out / f"{name}.csv", accuracy_table(scores))
+        console.print(f"tables: {out / name}.md, {out / name}.csv", markup=False)

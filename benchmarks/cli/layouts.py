@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from benchmarks.console import number, plural, table
 from benchmarks.presenters.losses import explains_stages, loss_row, losses_and_gains
+from legible_envs.support.names import printable
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,14 +27,15 @@ WORST_ROWS, BEST_ROWS = 10, 3
 
 def score_lines(design: Design) -> list[str]:
     """The score of a layout as lines of ``name value``, for users and for ``grep``."""
-    return [f"{name:<15} {value}" for name, value in design.facts()]
+    return [f"{printable(name):<15} {printable(value)}" for name, value in design.facts()]
 
 
 def show_design(console: Console, design: Design, picture: Path | None) -> None:
     """Print a layout, its score and its losses; write its picture if a path is given, and the panels of a run."""
     from rich.columns import Columns
+    from rich.text import Text
 
-    lines = "\n".join(score_lines(design))
+    lines = Text("\n".join(score_lines(design)))
     console.print(Columns([design.text(console), lines], padding=(1, 4)))
     _print_explanation(console, design)
     if compared := design.compared():
@@ -41,9 +43,9 @@ def show_design(console: Console, design: Design, picture: Path | None) -> None:
         console.print(table(compared))
     written = design.write_picture(picture)
     if written is not None:
-        console.print(f"{written[0]}: {written[1]}", soft_wrap=True)
+        console.print(f"{written[0]}: {written[1]}", soft_wrap=True, markup=False)
     elif design.picture:
-        console.print(f"{design.picture}, as a picture: add --out FILE.png", style="dim")
+        console.print(f"{design.picture}, as a picture: add --out FILE.png", style="dim", markup=False)
 
 
 def _print_explanation(console: Console, design: Design) -> None:

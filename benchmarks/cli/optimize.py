@@ -14,9 +14,10 @@ import numpy as np
 
 from benchmarks.cli.options import settings_from
 from benchmarks.cli.program import STOPPED
-from benchmarks.console import number, plural
+from benchmarks.console import number, plural, tell
 from benchmarks.presenters.base import Part, Presenter, summary_of
 from benchmarks.presenters.registry import presenter_of, presenter_of_run, usable_presenters
+from legible_envs.support.names import file_name
 from legible_envs.workspace import workspace_class
 from optimizers.errors import SearchError
 from optimizers.runs.folder import RunFolder, is_run_folder
@@ -40,8 +41,10 @@ def default_folder(domain: str, settings: Mapping[str, Any]) -> Path:
     """The folder of a search that names none."""
     name = re.sub(r"[^\w-]+", "-", domain)
     if settings.get("start_from"):
-        return Path("runs") / f"{name}-from-{Path(settings['start_from']).stem}-seed{settings['seed']}"
-    return Path("runs") / f"{name}-{presenter_of(domain).folder_name(settings)}-seed{settings['seed']}"
+        about = f"from-{Path(settings['start_from']).stem}"
+    else:
+        about = presenter_of(domain).folder_name(settings)
+    return Path("runs") / file_name(f"{name}-{about}-seed{settings['seed']}")
 
 
 def check_options(domain: str, given: Collection[str]) -> None:
@@ -126,7 +129,7 @@ def _search_part(domain: str, part: Part, settings: Mapping[str, Any], out: Path
     from optimizers import EmitterError, SearchInterrupted, search
 
     if part.title and not settings["quiet"]:
-        click.echo(part.title, err=True)
+        tell(part.title, err=True)
     iterations = settings.get("iterations")
     try:
         result = search(
@@ -155,7 +158,7 @@ def _search_part(domain: str, part: Part, settings: Mapping[str, Any], out: Path
         raise click.exceptions.Exit(STOPPED) from None
     if result.best_genome is None:
         why = "" if settings["max_distance"] is None else "; is --max-distance too low?"
-        click.echo(f"no layout scored in {plural(result.evaluations, 'evaluation')}{why}", err=True)
+        tell(f"no layout scored in {plural(result.evaluations, 'evaluation')}{why}", err=True)
         raise click.exceptions.Exit(1)
     if part.folder != out:
         write_pictures(part.folder)
@@ -173,9 +176,9 @@ def _emitter_options(settings: Mapping[str, Any]) -> Any:
 def _tell_stopped(domain: str, part: Part, out: Path, *, saved: bool, found: SearchResult | None = None) -> None:
     """Say how to go on, then draw what was found, unless that is interrupted too."""
     after = "" if found is None else f" after {plural(found.evaluations, 'evaluation')}"
-    click.echo(f"stopped{after}; {'everything is saved in' if saved else 'nothing was written to'} {out}", err=True)
+    tell(f"stopped{after}; {'everything is saved in' if saved else 'nothing was written to'} {out}", err=True)
     if saved:
-        click.echo(f"to go on: legible optimize {domain} --resume --out {shlex.quote(str(out))}", err=True)
+        tell(f"to go on: legible optimize {domain} --resume --out {shlex.quote(str(out))}", err=True)
     if found is not None and found.best_genome is not None:
         with contextlib.suppress(KeyboardInterrupt):
             write_pictures(part.folder)
@@ -190,9 +193,9 @@ def _tell(presenter: Presenter, result: SearchResult, parts: Collection[Part]) -
     console = say()
     console.print(presenter.text(console, result.best_layout))
     for line in found_lines(result, presenter):
-        console.print(line, soft_wrap=True)
+        console.print(line, soft_wrap=True, markup=False)
     for name, path in written.items():
-        console.print(f"{name:<8}{path}", soft_wrap=True)
+        console.print(f"{name:<8}{path}", soft_wrap=True, markup=False)
     if len(parts) > 1:
         console.print(f"each of the {plural(len(parts), 'search')} has a folder of its own there", style="dim")
 

@@ -18,6 +18,9 @@ from typing import Any, Final, NoReturn
 
 import click
 
+from benchmarks.console import tell
+from legible_envs.support.names import printable
+
 __all__ = ["STOPPED", "Commands", "Program", "leave"]
 
 STOPPED: Final = 130
@@ -76,11 +79,20 @@ class Program(Commands):
         except click.ClickException as error:
             code = error.exit_code
             with contextlib.suppress(AttributeError, OSError):  # there is no standard error to write to
-                _shortened(error).show()
+                _show(error)
         except (click.Abort, KeyboardInterrupt):
-            click.echo("stopped", err=True)
+            tell("stopped", err=True)
             code = STOPPED
         sys.exit(code)
+
+
+def _show(error: click.ClickException) -> None:
+    """Print an error as click does, but for what in its message would steer the terminal: messages quote names."""
+    shown = _shortened(error)
+    shown.message = printable(shown.message, lines=True)
+    stream = io.StringIO()
+    shown.show(stream)
+    tell(stream.getvalue().removesuffix("\n"), err=True)
 
 
 def _shortened(error: click.ClickException) -> click.ClickException:
@@ -124,7 +136,7 @@ def _one_line_warnings() -> Iterator[None]:
 
     def show(message: Warning | str, *_: Any, **__: Any) -> None:
         text = " ".join(_COLOUR_CODES.sub("", str(message)).removeprefix("WARN: ").split())
-        click.echo(f"Warning: {text}", err=True)
+        tell(f"Warning: {text}", err=True)
 
     with warnings.catch_warnings():
         warnings.showwarning = show

@@ -13,6 +13,7 @@ import click
 from benchmarks.cli.destinations import check_folder
 from benchmarks.cli.options import out_folder, scheduler_option, workers_option
 from benchmarks.cli.program import STOPPED
+from benchmarks.console import tell
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -112,7 +113,7 @@ def _run_part(module: str, folder: Path, how: Mapping[str, Any]) -> list[Section
 @click.command()
 @click.argument("experiment", type=click.Choice(list(EXPERIMENTS)))
 @click.option("--quick", is_flag=True, help="A version of two minutes.")
-@click.option("--seeds", type=click.IntRange(min=1), help="Seeds, in place of the experiment's own number.")
+@click.option("--seeds", type=click.IntRange(1, 10_000), help="Seeds, in place of the experiment's own number.")
 @out_folder
 @workers_option
 @scheduler_option
@@ -147,12 +148,12 @@ def reproduce(
                 progress=progress,
             )
     except KeyboardInterrupt:
-        click.echo(f"stopped; finished trials are kept in {folder}; the same command continues from there", err=True)
+        tell(f"stopped; finished trials are kept in {folder}; the same command continues from there", err=True)
         raise click.exceptions.Exit(STOPPED) from None
     except TrialsFailed as error:
         raise click.ClickException(str(error)) from error
     _tell(folder)
-    click.echo(f"report {report}")
+    tell(f"report {report}")
 
 
 def _tell(folder: Path) -> None:
@@ -160,4 +161,4 @@ def _tell(folder: Path) -> None:
     for kind in ("tables", "figures"):
         found = sorted(path.name for path in (folder / kind).glob("*") if path.is_file())
         if found:
-            click.echo(f"{kind} {folder / kind}: {', '.join(found)}")
+            tell(f"{kind} {folder / kind}: {', '.join(found)}")

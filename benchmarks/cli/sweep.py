@@ -9,6 +9,7 @@ import click
 from benchmarks.cli.destinations import check_folder
 from benchmarks.cli.options import out_folder, scheduler_option, workers_option
 from benchmarks.cli.program import STOPPED
+from benchmarks.console import tell
 
 __all__ = ["sweep"]
 
@@ -43,10 +44,10 @@ def sweep(file: Path, out: Path | None, workers: int | None, scheduler: str | No
     except TrialsFailed as error:
         rows, failed = error.table, error
     except KeyboardInterrupt:
-        click.echo(f"stopped; finished trials are kept in {folder}; the same command continues from there", err=True)
+        tell(f"stopped; finished trials are kept in {folder}; the same command continues from there", err=True)
         raise click.exceptions.Exit(STOPPED) from None
     if len(rows):
         say().print(table(for_reading(rows)))
-    click.echo(f"results {folder / 'results.csv'}\nsummary {folder / 'summary.csv'}")
+    tell(f"results {folder / 'results.csv'}\nsummary {folder / 'summary.csv'}")
     if failed is not None:
         raise click.ClickException(str(failed))

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from legible_envs.support.names import file_name
+
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -34,7 +36,7 @@ def slug(*words: str) -> str:
     text = "".join(c if c.isalnum() else "_" for c in "_".join(words).lower())
     while "__" in text:
         text = text.replace("__", "_")
-    return text.strip("_")
+    return file_name(text.strip("_"))
 
 
 def in_order(table: pd.DataFrame, **orders: Sequence[Any]) -> pd.DataFrame:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypedDict, TypeVar, Unpack
 
-from benchmarks.reports.experiment_report import write_table
+from benchmarks.csv_tables import write_table
 from benchmarks.trials import Event, run_trials
 from benchmarks.trials.store import Rows
 

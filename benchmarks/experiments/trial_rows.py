@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from benchmarks.csv_tables import as_written
+
 if TYPE_CHECKING:
     from pathlib import Path
 
@@ -141,7 +143,7 @@ def logged_rows(folder: Path, name: str, experiment: str) -> pd.DataFrame:
 
     path = folder / f"{name}.csv"
     try:
-        return pd.read_csv(path, keep_default_na=False, na_values=[""], low_memory=False)
+        return as_written(pd.read_csv(path, keep_default_na=False, na_values=[""], low_memory=False))
     except pd.errors.EmptyDataError:
         return pd.DataFrame()
     except FileNotFoundError as error:

@@ -342,7 +342,7 @@ def panels_text(console: Console, panels: Sequence[Panel]) -> Table:
     grid.add_row(*(kitchen_text(console, p.layout) for p in panels))
     grid.add_row()
     grid.add_row(*(Text(p.name, style="bold") for p in panels))
-    grid.add_row(*(f"legibility [bold cyan]{number(p.score)}[/]" for p in panels))
-    grid.add_row(*(f"distance   [bold]{number(p.distance, 1)}[/]" for p in panels))
+    grid.add_row(*(Text.assemble("legibility ", (number(p.score), "bold cyan")) for p in panels))
+    grid.add_row(*(Text.assemble("distance   ", (number(p.distance, 1), "bold")) for p in panels))
     grid.add_row(*(Text(p.note, style="dim") for p in panels))
     return grid

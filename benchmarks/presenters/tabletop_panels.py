@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from legible_envs.support.names import check_file_name
 from legible_envs.support.plain_data import parse_json
 from legible_envs.support.text import read_text
 from optimizers.errors import SearchError
@@ -97,7 +98,11 @@ def listed(folder: Path) -> dict[str, str]:
         raise SearchError(f"{folder / LIST} is not valid JSON: {error}") from error
     if not isinstance(data, dict) or not set(data) <= set(CONDITIONS) or not all(map(_is_name, data.values())):
         raise SearchError(f"{folder / LIST} must map conditions {list(CONDITIONS)} to folders")
-    return dict(data)
+    folders = dict(data)
+    for key, name in folders.items():  # the file may come from a stranger, and searches write there
+        if name != ".":
+            check_file_name(f"the folder of `{key}` in {folder / LIST}", name, error=SearchError)
+    return folders
 
 
 def _is_name(value: object) -> bool:

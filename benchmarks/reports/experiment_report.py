@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from html import unescape
 from pathlib import Path
@@ -14,11 +14,12 @@ from benchmarks.reports.numbers import with_minus
 from benchmarks.reports.pages import page_environment, table_of
 from legible_envs import __version__
 from legible_envs.support.files import write_text
+from legible_envs.support.names import printable
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Section", "write_experiment_report", "write_table", "write_tables"]
+__all__ = ["Section", "write_experiment_report"]
 
 LONG: Final = 24
 """Rows from which on a table is folded up."""
@@ -69,6 +70,7 @@ def _with_code(text: str) -> Any:
     """Words for the page, where what stands between backticks is set as code."""
     from markupsafe import Markup, escape
 
+    text = printable(text, lines=True)
     parts = text.split("`")
     if len(parts) % 2 == 0:
         return escape(with_minus(text))
@@ -134,15 +136,3 @@ class Section:
     tables: dict[str, pd.DataFrame] = field(default_factory=dict)
     figures: list[Path] = field(default_factory=list)
     captions: dict[str, str] = field(default_factory=dict)
-
-
-def write_table(path: Path, table: pd.DataFrame) -> Path:
-    """Write a table as CSV, all or nothing; folders that are missing are made."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write_text(path, table.to_csv(index=False))
-    return path
-
-
-def write_tables(folder: Path, tables: Iterable[tuple[str, pd.DataFrame]]) -> list[Path]:
-    """Write each table to ``folder/NAME.csv``."""
-    return [write_table(folder / f"{name}.csv", table) for name, table in tables]

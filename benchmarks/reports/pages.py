@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from benchmarks.reports.numbers import fixed, p_value, scale_of, significant, with_minus
+from legible_envs.support.names import printable
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -130,6 +131,11 @@ def _cell(value: Any, name: str, scale: float, digits: Any) -> str:
     return with_minus(str(value))
 
 
+def _seen(value: Any) -> Any:
+    """What is put into a page; of texts, what is not seen is written out. Markup is a page's own and stays."""
+    return printable(value, lines=True) if type(value) is str else value
+
+
 @lru_cache(maxsize=1)
 def page_environment() -> Environment:
     """The templates of pages, which escape what is put into them; ``number`` sets a number."""
@@ -137,7 +143,14 @@ def page_environment() -> Environment:
     from markupsafe import Markup
 
     loader = PackageLoader("benchmarks")
-    made = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    made = Environment(
+        loader=loader,
+        autoescape=True,
+        finalize=_seen,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
     made.filters["number"] = fixed
     made.globals["style"] = Markup(loader.get_source(made, "report.css")[0])
     return made

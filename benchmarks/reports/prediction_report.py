@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from benchmarks.reports.experiment_report import write_tables
+from benchmarks.csv_tables import write_tables
 from benchmarks.reports.pages import page_environment, table_of
 from legible_envs.support.files import write_text
 from legible_envs.support.plain_data import parse_json
@@ -156,9 +156,9 @@ def print_evaluation(console: Console, results: PredictionResults) -> None:
     console.print("Accuracy by fraction observed", style="bold")
     console.print(table(_accuracy_rows(found)))
     for what, (_, mean) in results.comparisons.items():
-        console.print(f"Differences by {what}", style="bold")
+        console.print(f"Differences by {what}", style="bold", markup=False)
         console.print(table(_pair_rows(mean)))
-        console.print(_verdict(mean), style="dim")
+        console.print(_verdict(mean), style="dim", markup=False)
     for note in results.notes:
         console.print(note, style="yellow", markup=False)
     console.print(f"definition: {found.definition}", style="dim", markup=False)

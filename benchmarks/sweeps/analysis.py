@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from benchmarks.csv_tables import write_table
 from benchmarks.sweeps.sweep import Sweep
 from benchmarks.trials import TrialName, TrialStore
-from legible_envs.support.files import write_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -64,5 +64,5 @@ def write_tables(sweep: Sweep, folder: str | Path) -> pd.DataFrame:
     folder.mkdir(parents=True, exist_ok=True)
     table = results(sweep, folder)
     for name, rows in (("results", table), ("summary", summarise(table))):
-        write_text(folder / f"{name}.csv", rows.to_csv(index=False))
+        write_table(folder / f"{name}.csv", rows)
     return table

@@ -15,6 +15,7 @@ import numpy as np
 
 from benchmarks.sweeps.sweep_file import MOST, SweepContent
 from legible_envs.support.models import as_plain, validated
+from legible_envs.support.names import file_name
 from legible_envs.support.plain_data import check_plain, parse_toml
 from legible_envs.support.text import read_text
 from legible_envs.workspace import Workspace, make_workspace
@@ -92,7 +93,7 @@ class Sweep:
         except ValueError as error:
             raise SweepError(f"{path}: {error}") from error
         try:
-            return cls.from_dict({"name": path.stem} | data)
+            return cls.from_dict({"name": file_name(path.stem)} | data)
         except SweepError as error:
             raise SweepError(f"{path}: {error}") from error
 

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Final, get_args
 from pydantic import BeforeValidator, ConfigDict
 
 from legible_envs.support.models import Checked, Choice, FileModel, Length, OneOrMore, Text, Whole
+from legible_envs.support.names import check_file_name
 from legible_envs.support.validation import integer, shown
 from legible_envs.workspace import ObjectiveName
 
@@ -17,17 +18,12 @@ MOST: Final = 1_000_000
 """Searches of a sweep."""
 
 _MOST_ENTRIES: Final = 1000
-_LONGEST_NAME: Final = 200
 _MOST_PARTICIPANTS: Final = 100_000
 
 
 def _name(name: str, value: object) -> str:
     """The name of a sweep, which names its folder, too."""
-    if not isinstance(value, str) or not value.strip() or value.strip(". ") == "" or set(value) & set("/\\:\0\n"):
-        raise ValueError(f"{name} must be a text without / \\ : or line breaks, got {shown(value)}")
-    if len(value) > _LONGEST_NAME:
-        raise ValueError(f"{name} must be a text of at most {_LONGEST_NAME} characters, got one of {len(value):,}")
-    return value
+    return check_file_name(name, value)
 
 
 def _table_with(key: str) -> BeforeValidator:

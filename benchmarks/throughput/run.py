@@ -81,11 +81,11 @@ def run_benchmark(
                 figures += measure()
     console.print(result_table(figures))
     for line in (*remarks, machine()):
-        console.print(line, style="dim")
+        console.print(line, style="dim", markup=False)
     if out is not None:
         out.parent.mkdir(parents=True, exist_ok=True)
         out.write_text(to_markdown(figures, remarks, settings), encoding="utf-8")
-        console.print(f"table: {out}")
+        console.print(f"table: {out}", markup=False)
     return figures
 
 

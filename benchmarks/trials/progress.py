@@ -8,6 +8,7 @@ from typing import Any
 
 from benchmarks.trials.running import Event
 from benchmarks.trials.store import Trial
+from legible_envs.support.names import printable
 
 __all__ = ["TrialsProgress"]
 
@@ -37,7 +38,7 @@ class TrialsProgress:
             self._bar = Progress(
                 BarColumn(bar_width=None),
                 MofNCompleteColumn(),
-                TextColumn("{task.fields[status]}"),
+                TextColumn("{task.fields[status]}", markup=False),
                 TimeRemainingColumn(compact=True),
             )
             self._task = self._bar.add_task("trials", total=None, status="")
@@ -62,7 +63,9 @@ class TrialsProgress:
         status = " · ".join(f"{count} {what}" for what, count in counts.items() if count)
         self._bar.update(self._task, total=event.total, completed=event.done + event.failed, status=status)
         workers = sorted(event.running.items())
-        lines = [Text(f"  {worker}: {describe(trial)}", style="dim") for worker, trial in workers[:_MAX_WORKERS]]
+        lines = [
+            Text(printable(f"  {worker}: {describe(trial)}"), style="dim") for worker, trial in workers[:_MAX_WORKERS]
+        ]
         if len(workers) > _MAX_WORKERS:
             lines.append(Text(f"  … and {len(workers) - _MAX_WORKERS} more workers", style="dim"))
         self._live.update(Group(self._bar, *lines))
@@ -70,7 +73,7 @@ class TrialsProgress:
 
 def describe(trial: Trial) -> str:
     """A trial in a line: its plain values, one after the other."""
-    text = " ".join(f"{key}={_short(value)}" for key, value in trial.items())
+    text = printable(" ".join(f"{key}={_short(value)}" for key, value in trial.items()))
     return text if len(text) <= _WIDTH else text[: _WIDTH - 1] + "…"
 
 

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 __all__ = ["Event", "TrialsFailed", "run_trials"]
 
 ATTEMPTS: Final = 2
+MOST_WORKERS: Final = 1_024
+"""Processes on this machine."""
 
 
 @dataclass
@@ -153,5 +155,5 @@ def _pool(workers: int | None, scheduler: str | None, num_trials: int) -> Pool:
         return ClusterPool(scheduler)
     from benchmarks.trials.local import InProcess, LocalPool, num_cores
 
-    count = num_cores() if workers is None else integer("workers", workers, 1, also="None")
+    count = num_cores() if workers is None else integer("workers", workers, 1, MOST_WORKERS, also="None")
     return InProcess() if count == 1 else LocalPool(min(count, num_trials))

@@ -18,11 +18,13 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.drawing.palette import HEAT
+from legible_envs.support.names import printable
 
 __all__ = [
     "Canvas",
     "Image",
     "Sprite",
+    "drawable",
     "heat_colour",
     "load_pygame",
     "mix",
@@ -36,6 +38,8 @@ Image = npt.NDArray[np.uint8]
 Point = tuple[float, float]
 _FINE: Final = 192  # sprites are drawn at least this fine before they are averaged down
 _BAND: Final = 32
+LONGEST_LINE: Final = 200
+"""Characters of a line of text in a picture."""
 
 
 def load_pygame() -> Any:
@@ -198,9 +202,19 @@ class Canvas:
         return Sprite(colour, through)
 
 
-@lru_cache(maxsize=1024)
 def text_sprite(text: str, size: int, colour: str) -> Sprite:
-    """One line of text in pygame's built-in typeface, about ``size`` pixels high."""
+    """One line of text in pygame's built-in typeface, about ``size`` pixels high; see :func:`drawable`."""
+    return _text_sprite(drawable(text), size, colour)
+
+
+def drawable(text: str) -> str:
+    """A text that can be drawn: what is not seen is written out, and what no picture has room for is cut off."""
+    seen = printable(text[: LONGEST_LINE + 1])
+    return seen if len(seen) <= LONGEST_LINE else seen[: LONGEST_LINE - 1] + "…"
+
+
+@lru_cache(maxsize=1024)
+def _text_sprite(text: str, size: int, colour: str) -> Sprite:
     pygame = load_pygame()
     if not pygame.font.get_init():
         pygame.font.init()

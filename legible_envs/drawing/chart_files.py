@@ -8,6 +8,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 from xml.dom import minidom
 
+from legible_envs.support.names import printable
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -46,11 +48,39 @@ def render(
         tips: By the ``gid`` of an artist, what is said of each of its marks when it is pointed at, in SVG.
         font: Family that SVG viewers are to take before any other.
     """
+    _write_out_names(figure)
     stream = io.BytesIO()
     figure.savefig(stream, format=kind, dpi=_DPI, metadata=_UNDATED[kind])
     if kind != "svg":
         return stream.getvalue()
     return _readable_svg(stream.getvalue(), title, description, tips or {}, font)
+
+
+def _write_out_names(figure: Figure) -> None:
+    """Write out what is not seen in the texts of a figure: it has no glyph, and in an SVG it would be invalid XML."""
+    from matplotlib.text import Text
+    from matplotlib.ticker import FixedFormatter, FuncFormatter
+
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):  # the texts of ticks come from their formatter whenever they are drawn
+            formatter: Any = axis.get_major_formatter()
+            if isinstance(formatter, FixedFormatter):
+                formatter.seq = [printable(str(text), lines=True) for text in formatter.seq]
+            elif isinstance(formatter, FuncFormatter) and not isinstance(formatter.func, _WrittenOut):
+                formatter.func = _WrittenOut(formatter.func)
+    for artist in figure.findobj(Text):
+        if isinstance(artist, Text) and not (text := artist.get_text()).isprintable():
+            artist.set_text(printable(text, lines=True))
+
+
+class _WrittenOut:
+    """A function that says what ticks are called, with what is not seen written out."""
+
+    def __init__(self, of: Any) -> None:
+        self.of = of
+
+    def __call__(self, *args: Any) -> str:
+        return printable(str(self.of(*args)), lines=True)
 
 
 def _readable_svg(
@@ -87,7 +117,7 @@ def _readable_svg(
 
 def _element(page: minidom.Document, name: str, text: str) -> Any:
     element = page.createElement(name)
-    element.appendChild(page.createTextNode(text))
+    element.appendChild(page.createTextNode(printable(text, lines=True)))
     return element
 
 

@@ -22,6 +22,7 @@ from matplotlib.textpath import TextToPath
 
 from legible_envs.drawing.chart_files import FORMATS, render
 from legible_envs.support.files import write_atomically
+from legible_envs.support.names import printable
 from legible_envs.support.validation import choice
 
 if TYPE_CHECKING:
@@ -268,7 +269,7 @@ _LINE: Final = 1.35
 def text_width(text: str, size: float, weight: str = "normal") -> float:
     """Width of a line of text in inches, in the font that comes with matplotlib; others are narrower, nearly all."""
     font = FontProperties(family=_STYLE["font.sans-serif"], size=size, weight=weight)
-    return float(TextToPath().get_text_width_height_descent(text, font, ismath=False)[0]) / 72
+    return float(TextToPath().get_text_width_height_descent(printable(text), font, ismath=False)[0]) / 72
 
 
 def _wrap(text: str, width: float, size: float, weight: str = "normal") -> list[str]:

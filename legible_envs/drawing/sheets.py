@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from legible_envs.drawing.canvas import Image, Sprite, paste, rgb, text_sprite
+from legible_envs.drawing.canvas import Image, Sprite, drawable, paste, rgb, text_sprite
 from legible_envs.drawing.palette import PAGE
 from legible_envs.support.files import write_atomically
 from legible_envs.support.validation import integer
@@ -24,7 +24,7 @@ def check_tile(tile: int) -> int:
 
 def fit_text(text: str, size: int, colour: str, width: int) -> Sprite:
     """A line of text no wider than ``width`` pixels: smaller, then cut off, where it would be."""
-    smallest = max(8, size * 2 // 3)
+    text, smallest = drawable(text), max(8, size * 2 // 3)
     for smaller in range(size, smallest - 1, -1):
         sprite = text_sprite(text, smaller, colour)
         if sprite.colour.shape[1] <= width:
@@ -84,14 +84,14 @@ def draw_side_by_side(
         titles: One line for each image, or None.
         captions: Text below each image, lines separated by a newline, or None.
         columns: How many to a row; None puts all in one.
-        gap: Pixels between and around them.
-        text: Height of a title in pixels; captions are a little smaller.
+        gap: Pixels between and around them, at most 1024.
+        text: Height of a title in pixels, 4 to 256; captions are a little smaller.
 
     Returns:
         ``(h, w, 3)`` uint8.
 
     Raises:
-        ValueError: No image, an array that is none, or not as many titles or captions as images.
+        ValueError: No image, an array that is none, not as many titles or captions as images, or a size out of range.
     """
     for number, image in enumerate(images):
         if image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8:
@@ -101,6 +101,7 @@ def draw_side_by_side(
             raise ValueError(f"expected {len(images)} {name}, one for each image, got {len(words)}")
     if not images or (columns is not None and columns < 1):
         raise ValueError("expected at least one image and at least one column")
+    gap, text = integer("gap", gap, 0, 1024, unit="pixels"), integer("text", text, 4, 256, unit="pixels")
     small = max(10, round(text * 0.8))
     cards = [
         _card(

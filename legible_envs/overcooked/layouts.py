@@ -40,6 +40,8 @@ XXXSXXX"""
 DEFAULT_SHAPE: Final = (7, 7)
 SPLITS: Final = ("all", "train", "test")
 MAX_TRIES: Final = 10_000
+MOST_LAYOUTS: Final = 100_000
+"""Kitchens that are made beforehand: `num_layouts`."""
 _ENDINGS: Final = (".layout", ".txt", ".json", ".yaml", ".npz", ".csv", ".py")
 
 
@@ -64,7 +66,8 @@ class RandomLayouts:
         test_fraction: Share of all kitchens that are test kitchens.
         split_seed: Another seed is another split.
         obstacle_rate: Probability of a virtual obstacle on each inner cell, before invalid kitchens are rejected.
-        num_layouts: Draw uniformly out of this many kitchens, made from ``layout_seed``; None means no limit.
+        num_layouts: Draw uniformly out of this many kitchens, at most 100,000, made from ``layout_seed``; None means
+            no limit.
         layout_seed: Seed of the kitchens when ``num_layouts`` is given.
         workspace: Further arguments of :class:`~legible_envs.overcooked.design.workspace.OvercookedWorkspace`, such as
             ``{"locked": …, "forbidden": …}``.
@@ -96,7 +99,9 @@ class RandomLayouts:
         self.test_fraction = real("test_fraction", test_fraction, 0, 1, closed="neither")
         self.split_seed = integer("split_seed", split_seed, high=math.inf, whole_floats=True)
         self.obstacle_rate = real("obstacle_rate", obstacle_rate, 0, 1, closed="left")
-        self.num_layouts = None if num_layouts is None else integer("num_layouts", num_layouts, 1, also="None")
+        self.num_layouts = (
+            None if num_layouts is None else integer("num_layouts", num_layouts, 1, MOST_LAYOUTS, also="None")
+        )
         self.layout_seed = integer("layout_seed", layout_seed, 0, math.inf, whole_floats=True)
         self.workspace = _checked_workspace(workspace)
         self._workspace: Any = None

@@ -35,12 +35,32 @@ from legible_envs.support.validation import as_array, integer, shown
 
 __all__ = ["OvercookedVectorEnv"]
 
+MOST_GAMES: Final = 65_536
+"""Games of one vector environment."""
+MOST_BYTES: Final = 2**34
+"""Of the arrays of all games."""
 _MARKS: Final = tuple(
     f"_{key}" for key in ("goal_mask", "action_mask", "layout_id", "num_done", "deliveries", "crossings")
 )
 """For each key of infos, the one that says which games have it; as in ``SyncVectorEnv``."""
 
 Infos = dict[str, Any]
+
+
+def _check_memory(count: int, packed: PackedKitchen, observations: spaces.Space[Any]) -> None:
+    """Refuse more games than there is room for, before any is made.
+
+    Raises:
+        ValueError: Their arrays would take more than ``MOST_BYTES``.
+    """
+    arrays = (packed.routes, *(array for array in packed.kitchen if isinstance(array, np.ndarray)))
+    each = sum(array.nbytes for array in arrays) + 4 * int(packed.rules[STATE_SIZE])
+    each += int(np.prod(observations.shape or (1,))) * np.dtype(observations.dtype).itemsize
+    if count * each > MOST_BYTES:
+        raise ValueError(
+            f"`num_envs`: {count:,} games in kitchens of {packed.layout.shape} take {count * each / 2**30:.1f} GiB; "
+            f"expected at most {MOST_BYTES / 2**30:g} GiB, which are {MOST_BYTES // each:,} games"
+        )
 
 
 class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any]]):
@@ -81,7 +101,7 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
         self.autoreset_mode = read_autoreset_mode(autoreset_mode)
         self.metadata = {**OvercookedEnv.metadata, "autoreset_mode": self.autoreset_mode}
         self._set_render_mode(render_mode)
-        self.num_envs = integer("num_envs", num_envs, 1, whole_floats=True)
+        self.num_envs = integer("num_envs", num_envs, 1, MOST_GAMES, whole_floats=True)
         self.settings = KitchenSettings(**kwargs)
         self.max_episode_steps = read_step_limit(max_episode_steps)
         self.single_action_space = spaces.Discrete(NUM_ACTIONS)
@@ -92,7 +112,9 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
         self._seeds = [-1] * self.num_envs
         self._ended = 0
         self._begun = False
-        self._allocate(self.settings.pack(self.settings.preview()))
+        packed = self.settings.pack(self.settings.preview())
+        _check_memory(self.num_envs, packed, self.single_observation_space)
+        self._allocate(packed)
 
     def _allocate(self, packed: PackedKitchen) -> None:
         """Make the arrays, every game in the same kitchen."""

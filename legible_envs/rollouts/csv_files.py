@@ -27,6 +27,9 @@ or ``0x1``. Text is UTF-8, or UTF-16 with a byte-order mark. Commas stand betwee
 the header tells. Values that hold one, a quote or a line break are quoted, their quotes doubled (RFC 4180); blanks at
 the ends of a value count only where it is quoted. The same holds inside ``candidates``: ``"a;b";c`` are two goals.
 Rows without any value are skipped; every other row has as many values as the header.
+
+Spreadsheets run what begins like a formula. In the columns from ``goal`` to ``layout`` such a text, ``=1+1``, is
+written with an apostrophe in front, ``'=1+1``, and read without it.
 """
 
 from __future__ import annotations
@@ -50,6 +53,8 @@ from legible_envs.support.csv_table import (
     join_values,
     read_records,
     split_values,
+    spreadsheet_text,
+    text_of_spreadsheet,
 )
 from legible_envs.support.file_kinds import describe_file
 from legible_envs.support.files import write_text
@@ -61,7 +66,8 @@ __all__ = ["is_csv_of_trajectories", "read_csv", "write_csv"]
 _CELLS: Final = ("row", "col")
 _AXES: Final = ("x", "y", "z")
 _TEXTS: Final = ("start", "participant", "condition", "layout_name")
-_SAME: Final = ("goal", "candidates", *_TEXTS, "layout", "candidate_set", "positions", "complete")
+_NAMED: Final = ("goal", "candidates", *_TEXTS, "layout")
+_SAME: Final = (*_NAMED, "candidate_set", "positions", "complete")
 _KIND: Final = "layout_kind"
 _COLUMNS: Final = ("trajectory", "time", *_CELLS, *_AXES, *_SAME, _KIND)
 _EXPECTED: Final = "expected columns 'trajectory', 'goal' and row, col (cells) or x, y (positions)"
@@ -105,6 +111,7 @@ def write_csv(path: str | os.PathLike[str], trajectories: Iterable[Trajectory]) 
         same += [line, each.candidate_set, places, str(int(each.complete))]
         same += [kind.name if kind else ""] if named else []
         _check_writable(number, same)
+        same[: len(_NAMED)] = map(spreadsheet_text, same[: len(_NAMED)])
         tail = join_values(same)
         for time, state in zip(each.times.tolist(), each.states.tolist(), strict=True):
             lines.append(f"{number},{time!r},{','.join(map(repr, state))},{tail}")
@@ -217,7 +224,9 @@ class _Table:
     def text(self, record: CsvRecord, column: str) -> str:
         """A value; empty where the file has no such column."""
         at = self.columns.get(column)
-        return "" if at is None else record.values[at]
+        if at is None:
+            return ""
+        return text_of_spreadsheet(record.values[at]) if column in _NAMED else record.values[at]
 
 
 def _first_line(text: str) -> str:

@@ -13,7 +13,16 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 from typing import Final, NamedTuple
 
-__all__ = ["DELIMITERS", "CsvRecord", "CsvSyntaxError", "join_values", "read_records", "split_values"]
+__all__ = [
+    "DELIMITERS",
+    "CsvRecord",
+    "CsvSyntaxError",
+    "join_values",
+    "read_records",
+    "split_values",
+    "spreadsheet_text",
+    "text_of_spreadsheet",
+]
 
 DELIMITERS: Final = {",": "commas", ";": "semicolons", "\t": "tabs"}
 """What may stand between values, and what messages call it."""
@@ -114,3 +123,34 @@ def join_values(values: Sequence[str], delimiter: str = ",") -> str:
 def _quoted(value: str, delimiter: str) -> str:
     needs = delimiter in value or '"' in value or "\n" in value or "\r" in value or value.strip(_BLANKS) != value
     return '"' + value.replace('"', '""') + '"' if needs else value
+
+
+# -- spreadsheets, which run what looks like a formula ----------------------------------------------------------------
+
+_FORMULA: Final = re.compile(r"'* *[=+\-@\t\r\n＝＋－＠]")
+_MARKED: Final = re.compile(f"'{_FORMULA.pattern}")
+_HARMLESS: Final = re.compile(r"[+-]?(?:(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|inf)?")
+
+
+def spreadsheet_text(text: str) -> str:
+    """A text as it stands in a CSV, so that no spreadsheet takes it for a formula and runs it.
+
+    What begins like a formula (``=``, ``+``, ``-``, ``@``, their wide forms, a tab or the end of a line, also behind
+    blanks) has an apostrophe in front, the mark of text in spreadsheets. Numbers such as ``-0.5`` stay as they are, and
+    a lone sign. :func:`text_of_spreadsheet` gives every text back.
+
+    Example:
+        >>> spreadsheet_text("=1+1"), spreadsheet_text("-1"), spreadsheet_text("'=1+1"), spreadsheet_text("cube")
+        ("'=1+1", '-1', "''=1+1", 'cube')
+    """
+    return f"'{text}" if _FORMULA.match(text) and not _HARMLESS.fullmatch(text) else text
+
+
+def text_of_spreadsheet(value: str) -> str:
+    """The text that :func:`spreadsheet_text` wrote; other values stay as they are.
+
+    Example:
+        >>> text_of_spreadsheet("'=1+1"), text_of_spreadsheet("'tis"), text_of_spreadsheet("-1")
+        ('=1+1', "'tis", '-1')
+    """
+    return value[1:] if _MARKED.match(value) else value

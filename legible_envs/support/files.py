@@ -58,12 +58,12 @@ def write_atomically(path: Path, write: Callable[[BinaryIO], object]) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text in UTF-8, all or nothing, its line breaks as they are.
+    """Write a text in UTF-8, all or nothing, its line breaks as they are; halves of characters as escapes.
 
     Raises:
         OSError: The file could not be written; what was there before is untouched.
     """
-    write_atomically(path, lambda stream: stream.write(text.encode()))
+    write_atomically(path, lambda stream: stream.write(text.encode(errors="backslashreplace")))
 
 
 def write_npz(path: str | os.PathLike[str], arrays: Mapping[str, Any]) -> None:

@@ -169,11 +169,11 @@ def integer(
     raise error(_refusal(name, f"an integer{_range(low, limit, 'both')}", value, also, unit))
 
 
-def integers(low: int, **values: object) -> None:
+def integers(low: int, high: float = LARGEST, /, **values: object) -> None:
     """Check whole numbers given by name; None stands for a default and passes.
 
     Raises:
-        ValueError: One is no whole number, or below ``low``; the message names it.
+        ValueError: One is no whole number, below ``low`` or above ``high``; the message names it.
 
     Example:
         >>> integers(1, batch_size=36, initial=None)
@@ -183,7 +183,7 @@ def integers(low: int, **values: object) -> None:
     """
     for name, value in values.items():
         if value is not None:
-            integer(name, value, low)
+            integer(name, value, low, high)
 
 
 def choice(name: str, value: object, options: Iterable[T], *, also: str = "", error: MakeError = ValueError) -> T:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 import math
 from collections.abc import Iterable, Mapping
@@ -16,7 +17,10 @@ import numpy.typing as npt
 
 from legible_envs.errors import LayoutError
 from legible_envs.support.text import read_source
+from legible_envs.support.validation import integer
 from legible_envs.tabletop.objects import (
+    MOST_OBJECTS,
+    MOST_OBSTACLES,
     OBSTACLE_SIZE,
     Table,
     TableObject,
@@ -32,6 +36,7 @@ __all__ = ["TabletopLayout"]
 
 SCHEMA: Final = 1
 MAX_OBSTACLES: Final = 4
+"""Places for obstacles in a genome, unless another number is asked for."""
 _EDGE: Final = 1e-9
 
 
@@ -49,12 +54,12 @@ class TabletopLayout:
     through a gap of exactly its width.
 
     Args:
-        objects: The boxes; their names are the goals.
-        obstacles: The virtual obstacles.
+        objects: The boxes, at most 128; their names are the goals.
+        obstacles: The virtual obstacles, at most 64.
         table: The table.
 
     Raises:
-        LayoutError: No object at all, or two of one name, or an object called like a start.
+        LayoutError: No object at all, too many, or two of one name, or an object called like a start.
 
     Example:
         >>> layout = TabletopLayout([TableObject("cup", (0.6, 0.5))], [VirtualObstacle((0.6, 0.3))])
@@ -71,8 +76,8 @@ class TabletopLayout:
         obstacles: Iterable[VirtualObstacle] = (),
         table: Table | None = None,
     ) -> None:
-        self._objects = tuple(objects)
-        self._obstacles = tuple(obstacles)
+        self._objects = _at_most(MOST_OBJECTS, "objects", objects)
+        self._obstacles = _at_most(MOST_OBSTACLES, "obstacles", obstacles)
         self._table = Table() if table is None else table
         for part, kind in [(o, TableObject) for o in self._objects] + [(o, VirtualObstacle) for o in self._obstacles]:
             if not isinstance(part, kind):
@@ -334,6 +339,7 @@ class TabletopLayout:
         """
         if any(o.size != tuple(obstacle_size) for o in self._obstacles):
             raise LayoutError(f"a genome holds obstacles of {tuple(obstacle_size)} m only", rule="obstacles")
+        integer("max_obstacles", max_obstacles, 0, MOST_OBSTACLES)
         if len(self._obstacles) > max_obstacles:
             raise LayoutError(
                 f"the layout has {len(self._obstacles)} obstacles, the genome holds {max_obstacles}", rule="obstacles"
@@ -401,3 +407,11 @@ class TabletopLayout:
             object.__setattr__(self, name, value)
             return
         raise AttributeError(f"layouts are immutable; cannot set {name!r} (see with_genome and with_obstacles)")
+
+
+def _at_most(most: int, what: str, parts: Iterable[Any]) -> tuple[Any, ...]:
+    """The parts of a layout, of which no more are taken than it may have."""
+    found = tuple(itertools.islice(parts, most + 1))
+    if len(found) > most:
+        raise LayoutError(f"a layout has at most {most} {what}, got more", rule=what)
+    return found

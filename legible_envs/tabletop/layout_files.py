@@ -7,21 +7,29 @@ from typing import Annotated, Any, Final
 from pydantic import Field
 
 from legible_envs.support.models import Choice, FileModel, Flag, Length, Real, Text, YamlModel
-from legible_envs.tabletop.objects import CUBE, MOST_OBJECTS, MOST_OBSTACLES, OBSTACLE_SIZE
+from legible_envs.tabletop.objects import (
+    CUBE,
+    FARTHEST,
+    LONGEST,
+    MAX_STARTS,
+    MOST_OBJECTS,
+    MOST_OBSTACLES,
+    OBSTACLE_SIZE,
+)
 
 __all__ = ["LayoutContent", "ObjectEntry", "ObstacleEntry", "TableEntry", "TaskFileContent"]
 
 SCHEMA: Final = 1
 
-_FAR: Final = 1e6  # metres: far beyond every table, and squares of it are still exact enough to compare
-_FINE: Final = 1e-6
+_FINE: Final = 1e-6  # metres
+_LARGEST_ANGLE: Final = 1e6
 
-Coordinate = Annotated[float, Real(-_FAR, _FAR)]
+Coordinate = Annotated[float, Real(-FARTHEST, FARTHEST)]
 Point = Annotated[list[Coordinate], Length(2, 2)]
 Rectangle = Annotated[list[Coordinate], Length(4, 4)]
-Size = Annotated[list[Annotated[float, Real(_FINE, _FAR)]], Length(2, 2)]
-Angle = Annotated[float, Real(-_FAR, _FAR)]
-Points = Annotated[dict[str, Point], Length(1, MOST_OBJECTS)]
+Size = Annotated[list[Annotated[float, Real(_FINE, LONGEST)]], Length(2, 2)]
+Angle = Annotated[float, Real(-_LARGEST_ANGLE, _LARGEST_ANGLE)]
+Points = Annotated[dict[str, Point], Length(1, MAX_STARTS)]
 
 
 class ObjectEntry(FileModel):
@@ -51,7 +59,7 @@ class TableEntry(FileModel):
     region: Rectangle | None = None
     assembly: Rectangle | None = None
     starts: Points | None = None
-    hand: Annotated[float, Real(0, _FAR)] | None = None
+    hand: Annotated[float, Real(0, LONGEST)] | None = None
 
 
 Objects = Annotated[list[ObjectEntry], Length(1, MOST_OBJECTS)]

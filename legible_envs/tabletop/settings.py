@@ -16,7 +16,7 @@ from legible_envs.errors import LayoutError
 from legible_envs.support.validation import choice, integer, is_masked, real, shown, switched_weights
 from legible_envs.tabletop.game.game import CONTACTS, GameRules
 from legible_envs.tabletop.game.shaping import SHAPING
-from legible_envs.tabletop.layout import TabletopLayout
+from legible_envs.tabletop.layout import MOST_OBSTACLES, TabletopLayout
 from legible_envs.tabletop.objects import Point, point
 from legible_envs.tabletop.task import TabletopTask, read_task
 
@@ -211,7 +211,7 @@ class TableSettings:
         threshold: float,
     ) -> None:
         self.task = read_task(task)
-        self.max_obstacles = integer("max_obstacles", max_obstacles, 0)
+        self.max_obstacles = integer("max_obstacles", max_obstacles, 0, MOST_OBSTACLES)
         self.rules = GameRules(
             virtual_obstacles=choice("virtual_obstacles", virtual_obstacles, ("hard", "soft")),  # type: ignore[arg-type]
             contact=choice("contact", contact, CONTACTS),

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.errors import LayoutError, TaskError
+from legible_envs.support.names import is_whole
 from legible_envs.support.text import dump_yaml, read_source
 from legible_envs.support.validation import shown
 from legible_envs.tabletop.layout import TabletopLayout
@@ -64,8 +65,8 @@ class TabletopTask:
     configuration: Mapping[str, Point] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.name, str) or not self.name:
-            raise TaskError(f"a task needs a non-empty name, got {self.name!r}")
+        if not isinstance(self.name, str) or not self.name or not is_whole(self.name):
+            raise TaskError(f"a task needs a non-empty name of whole characters, got {self.name!r}")
         known = self.layout.place_names
         unknown = [place for place in self.graph.places if place not in known]
         if unknown:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, Final
 
 import gymnasium as gym
 import numpy as np
@@ -23,6 +23,9 @@ from legible_envs.tabletop.settings import layout_entries
 __all__ = ["TabletopVectorEnv"]
 
 Infos = dict[str, Any]
+
+MOST_TABLES: Final = 4_096
+"""Environments of one vector environment."""
 
 
 class TabletopVectorEnv(JsonSpec, SyncVectorEnv):
@@ -51,7 +54,7 @@ class TabletopVectorEnv(JsonSpec, SyncVectorEnv):
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         **kwargs: Any,
     ) -> None:
-        count = integer("num_envs", num_envs, 1, whole_floats=True)
+        count = integer("num_envs", num_envs, 1, MOST_TABLES, whole_floats=True)
         self.max_episode_steps = read_step_limit(max_episode_steps)
         mode = read_autoreset_mode(autoreset_mode)
         super().__init__([partial(_make, self.max_episode_steps, kwargs)] * count, autoreset_mode=mode)

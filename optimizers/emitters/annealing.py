@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.support.validation import integers, real
-from legible_envs.workspace import Workspace
+from legible_envs.workspace import MOST_GENOMES, Workspace
 from optimizers.emitters.base import AddInfo, Seed, WorkspaceEmitter, read_only
 from optimizers.emitters.draws import draw_elites, perturbed
 
@@ -101,7 +101,8 @@ class AnnealingEmitter(WorkspaceEmitter):
         initial: int = 1000,
         seed: Seed = None,
     ) -> None:
-        integers(1, chains=chains, cycle=cycle, groups=groups, initial=initial)
+        integers(1, MOST_GENOMES, chains=chains, groups=groups, initial=initial)
+        integers(1, cycle=cycle)
         integers(0, resamplings=resamplings)
         real("heat", heat, 0, closed="neither")
         real("cold", cold, 0, 1, closed="right")

@@ -9,12 +9,12 @@ import numpy.typing as npt
 from ribs.emitters import EmitterBase
 
 from legible_envs.support.validation import integers
-from legible_envs.workspace import Workspace
+from legible_envs.workspace import MOST_GENOMES, MOST_NUMBERS, Workspace
 
 if TYPE_CHECKING:
     from ribs.archives import ArchiveBase
 
-__all__ = ["AddInfo", "CountingEmitter", "Seed", "WorkspaceEmitter", "read_only", "seed_sequence"]
+__all__ = ["AddInfo", "CountingEmitter", "Seed", "WorkspaceEmitter", "check_batch", "read_only", "seed_sequence"]
 
 Seed = int | np.random.SeedSequence | None
 AddInfo = dict[str, npt.NDArray[Any]]
@@ -68,7 +68,12 @@ class WorkspaceEmitter(EmitterBase):
         """
 
     def _blank_genomes(self, n: int = 0) -> npt.NDArray[Any]:
-        """``(n, d)`` zeros of the type of genomes: a population before it begins."""
+        """``(n, d)`` zeros of the type of genomes: a population before it begins.
+
+        Raises:
+            ValueError: More than a million, or more than 2**27 numbers.
+        """
+        check_batch(n, int(self.solution_dim))
         return np.zeros((n, int(self.solution_dim)), dtype=self.archive.dtypes["solution"])
 
 
@@ -100,6 +105,22 @@ class CountingEmitter(WorkspaceEmitter):
     def done(self) -> bool:
         """Whether all ``iterations`` have ended."""
         return self._limit is not None and self.finished >= self._limit
+
+
+def check_batch(rows: int, size: int) -> None:
+    """Refuse settings with which one batch of an emitter would be larger than workspaces draw.
+
+    Args:
+        rows: Genomes of a batch.
+        size: Numbers in a genome.
+
+    Raises:
+        ValueError: They are too many.
+    """
+    if rows > (most := min(MOST_GENOMES, MOST_NUMBERS // max(1, size))):
+        raise ValueError(
+            f"these settings make batches of {rows:,} layouts; expected at most {most:,} of {size} numbers"
+        )
 
 
 def seed_sequence(seed: Seed) -> np.random.SeedSequence:

@@ -11,7 +11,7 @@ from ribs.emitters import EvolutionStrategyEmitter
 
 from legible_envs.random_keys import KeyDecoder
 from legible_envs.support.validation import integers, real
-from legible_envs.workspace import Workspace
+from legible_envs.workspace import MOST_GENOMES, Workspace
 from optimizers.emitters.adapter import FloatArchiveView, GenomeAdapter
 from optimizers.emitters.base import Seed, read_only, seed_sequence
 from optimizers.emitters.draws import draw_elites
@@ -58,7 +58,7 @@ class _KeyStrategies(GenomeAdapter):
         initial: int,
         seed: Seed,
     ) -> None:
-        integers(1, strategies=strategies, batch_size=batch_size, initial=initial)
+        integers(1, MOST_GENOMES, strategies=strategies, batch_size=batch_size, initial=initial)
         real("sigma0", sigma0, 0, closed="neither")
         if strategies is None:
             planned = _MOST if evaluations is None else evaluations // (_ROUNDS * batch_size)

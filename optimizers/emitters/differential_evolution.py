@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.support.validation import choice, integers, real
-from legible_envs.workspace import Workspace
+from legible_envs.workspace import MOST_GENOMES, Workspace
 from optimizers.emitters.base import AddInfo, CountingEmitter, Seed, read_only
 from optimizers.emitters.draws import draw_elites
 
@@ -76,7 +76,7 @@ class DifferentialEvolutionEmitter(CountingEmitter):
         evaluations: int | None = None,
         seed: Seed = None,
     ) -> None:
-        integers(5, population=population)
+        integers(5, MOST_GENOMES, population=population)
         choice("strategy", strategy, STRATEGIES)
         real("recombination", recombination, 0, 1)
         super().__init__(archive, workspace, iterations=iterations, seed=seed)

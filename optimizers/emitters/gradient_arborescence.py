@@ -9,7 +9,7 @@ import numpy.typing as npt
 from ribs.emitters import GradientArborescenceEmitter as RibsGradientArborescenceEmitter
 
 from legible_envs.support.validation import integers, real
-from legible_envs.workspace import Workspace
+from legible_envs.workspace import MOST_GENOMES, Workspace
 from optimizers.emitters.adapter import FloatArchiveView, GenomeAdapter
 from optimizers.emitters.base import Seed, seed_sequence
 
@@ -83,7 +83,7 @@ class GradientArborescenceEmitter(GenomeAdapter):
             )
         real("sigma0", sigma0, 0, closed="neither")
         real("lr", lr, 0, closed="neither")
-        integers(1, batch_size=batch_size, initial=initial)
+        integers(1, MOST_GENOMES, batch_size=batch_size, initial=initial)
         # Whether there are gradients, and of this objective, shows before anything is scored.
         differentiable = cast("DifferentiableWorkspace", workspace)
         differentiable.gradients(np.empty((0, archive.solution_dim)), objective)

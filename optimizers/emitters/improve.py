@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.support.validation import integers
-from legible_envs.workspace import Workspace
-from optimizers.emitters.base import AddInfo, CountingEmitter, Seed, read_only
+from legible_envs.workspace import MOST_GENOMES, Workspace
+from optimizers.emitters.base import AddInfo, CountingEmitter, Seed, check_batch, read_only
 from optimizers.emitters.draws import draw_elites
 
 if TYPE_CHECKING:
@@ -78,10 +78,11 @@ class ImproveWorkspaceEmitter(CountingEmitter):
         initial: int = 1000,
         seed: Seed = None,
     ) -> None:
-        integers(1, climbs=climbs, fanout=fanout, initial=initial)
+        integers(1, MOST_GENOMES, climbs=climbs, fanout=fanout, initial=initial)
         super().__init__(archive, workspace, iterations=iterations, seed=seed)
         self.climbs = int(climbs) if climbs is not None else _default_climbs(fanout, evaluations, iterations)
         self.fanout = int(fanout)
+        check_batch(self.climbs * self.fanout, int(archive.solution_dim))
         self.started = 0
         self._initial = int(initial)
         # One row per climb, see Climbs.

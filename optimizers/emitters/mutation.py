@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy.typing as npt
 
 from legible_envs.support.validation import integers
-from legible_envs.workspace import Workspace
+from legible_envs.workspace import MOST_GENOMES, Workspace
 from optimizers.emitters.base import Seed, WorkspaceEmitter
 from optimizers.emitters.draws import draw_elites, perturbed
 
@@ -45,7 +45,7 @@ class MutationEmitter(WorkspaceEmitter):
         evaluations: int | None = None,
         seed: Seed = None,
     ) -> None:
-        integers(1, batch_size=batch_size)
+        integers(1, MOST_GENOMES, batch_size=batch_size)
         super().__init__(archive, workspace, seed=seed)
         planned = _BATCH if evaluations is None else min(_BATCH, max(1, evaluations // _ROUNDS))
         self._batch_size = planned if batch_size is None else int(batch_size)

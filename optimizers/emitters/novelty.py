@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.support.validation import integers, real
-from legible_envs.workspace import Workspace
+from legible_envs.workspace import MOST_GENOMES, Workspace
 from optimizers.emitters.base import AddInfo, Seed, WorkspaceEmitter, read_only
 from optimizers.emitters.draws import crossed, draw_elites, perturbed
 
@@ -78,7 +78,7 @@ class NoveltyLocalCompetitionEmitter(WorkspaceEmitter):
         evaluations: int | None = None,
         seed: Seed = None,
     ) -> None:
-        integers(2, population=population)
+        integers(2, MOST_GENOMES, population=population)
         integers(1, neighbours=neighbours)
         real("crossover", crossover, 0, 1)
         real("remember", remember, 0, 1)

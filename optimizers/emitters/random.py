@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy.typing as npt
 
 from legible_envs.support.validation import integers
-from legible_envs.workspace import Workspace
+from legible_envs.workspace import MOST_GENOMES, Workspace
 from optimizers.emitters.base import Seed, WorkspaceEmitter
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ class RandomWorkspaceEmitter(WorkspaceEmitter):
         batch_size: int = 1024,
         seed: Seed = None,
     ) -> None:
-        integers(1, batch_size=batch_size)
+        integers(1, MOST_GENOMES, batch_size=batch_size)
         super().__init__(archive, workspace, seed=seed)
         self._batch_size = int(batch_size)
 

@@ -26,7 +26,7 @@ from predictors.evaluation.learning_curves import learning_curve
 from predictors.evaluation.metrics import tied_shares
 from predictors.evaluation.omissions import Omission, no_predictor_left, omission_table
 from predictors.evaluation.results import Evaluation, LearningCurve
-from predictors.evaluation.splits import Groups, Rare, Split, check_evaluable, check_seed, folds
+from predictors.evaluation.splits import MOST_REPEATS, Groups, Rare, Split, check_evaluable, check_seed, folds
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -169,7 +169,7 @@ def evaluate(
 
     trajectories, fractions = list(X), check_fractions(fractions, cut, distinct=True)
     integer("cv", cv, 2, unit="folds")
-    integer("repeats", repeats, 1)
+    integer("repeats", repeats, 1, MOST_REPEATS)
     choice("rare", rare, get_args(Rare))
     check_input(trajectories, fractions, cut, ties, groups)
     named = named_predictors(predictors)

@@ -22,7 +22,7 @@ from predictors.evaluation.answers import (
 )
 from predictors.evaluation.omissions import Omission, no_predictor_left, omission_table
 from predictors.evaluation.results import LearningCurve
-from predictors.evaluation.splits import Groups, Split, check_learnable, check_seed, nested_training_sets
+from predictors.evaluation.splits import MOST_REPEATS, Groups, Split, check_learnable, check_seed, nested_training_sets
 
 __all__ = ["learning_curve"]
 
@@ -70,7 +70,7 @@ def learning_curve(
     import pandas as pd
 
     trajectories, fractions = list(X), check_fractions(fractions, cut, distinct=True)
-    integer("repeats", repeats, 1)
+    integer("repeats", repeats, 1, MOST_REPEATS)
     real("test_share", test_share, 0, 1, closed="neither")
     choice("rare", rare, ("error", "redraw"))
     check_input(trajectories, fractions, cut, ties, groups)

@@ -6,8 +6,11 @@ predictor from being fitted, but not the others from being evaluated: tables sho
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
+
+from legible_envs.support.names import printable
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -16,6 +19,7 @@ __all__ = [
     "NO_NUMBER",
     "Omission",
     "dashed",
+    "markdown_row",
     "markdown_table",
     "no_predictor_left",
     "omission_notes",
@@ -24,6 +28,9 @@ __all__ = [
 
 NO_NUMBER: Final = "\u2013"
 """What tables show where a predictor could not be evaluated: a dash."""
+
+
+_TAG: Final = re.compile(r"<(?=[A-Za-z/!?])")
 
 
 class Omission(NamedTuple):
@@ -84,8 +91,14 @@ def markdown_table(table: pd.DataFrame) -> str:
     lines = [columns, [" ---: " if is_number else " --- " for is_number in numeric]]
     lines += [[dashed(value) for value in row] for row in table.itertuples(index=False, name=None)]
     head, rule, *rows = lines
-    return "\n".join([_line(head), "|" + "|".join(rule) + "|", *(_line(row) for row in rows)]) + "\n"
+    return "\n".join([markdown_row(head), "|" + "|".join(rule) + "|", *(markdown_row(row) for row in rows)]) + "\n"
 
 
-def _line(cells: Sequence[str]) -> str:
-    return "| " + " | ".join(cell.replace("|", "\\|").replace("\n", " ") for cell in cells) + " |"
+def markdown_row(cells: Sequence[str]) -> str:
+    """A row of a table in Markdown; nothing in a cell ends it, begins an element of HTML, or steers a terminal."""
+    return "| " + " | ".join(_cell(cell) for cell in cells) + " |"
+
+
+def _cell(text: str) -> str:
+    told = text.replace("\n", " ").replace("|", "\\|").replace("](", "]\\(")
+    return printable(_TAG.sub("&lt;", told))

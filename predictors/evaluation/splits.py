@@ -31,6 +31,8 @@ Groups = Literal["participant"]
 Rare = Literal["error", "keep"]
 Split = tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]
 
+MOST_REPEATS: Final = 1_000
+"""Of a cross-validation, and of a learning curve."""
 _GROUPS: Final[tuple[Groups | None, ...]] = ("participant", None)
 
 

@@ -40,6 +40,16 @@ SCHEMA: Final = 1
 _KIND: Final = "legible-envs neural predictor"
 _WEIGHTS: Final = "weights/"
 _AT_ONCE: Final = 512
+_MOST: Final = {
+    "num_layers": 64,
+    "members": 100,
+    "batch_size": 1_000_000,
+    "max_epochs": 1_000_000,
+    "patience": 1_000_000,
+}
+"""Greatest values of whole numbers."""
+_WIDEST: Final = 8_192
+"""Of a layer."""
 
 
 class NeuralPredictor(GoalPredictor):
@@ -257,7 +267,7 @@ class NeuralPredictor(GoalPredictor):
 
     def _settings(self) -> Training:
         for name in (*self._sizes, "members", "batch_size", "max_epochs", "patience"):
-            integer(name, getattr(self, name), 1)
+            integer(name, getattr(self, name), 1, _MOST.get(name, _WIDEST))
         limits = {"learning_rate": 10.0, "weight_decay": 10.0, "dropout": 0.99, "validation_fraction": 0.5}
         for name, most in limits.items():
             real(name, getattr(self, name), 0, most)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 import numpy.typing as npt
 
+from legible_envs.support.names import printable
 from legible_envs.support.validation import integer, real
 
 if TYPE_CHECKING:
@@ -113,7 +114,7 @@ def draw_reaches(
 
     Args:
         gaussian: A fitted predictor of reaches in the plane.
-        size: Width and height in pixels.
+        size: Width and height in pixels, 16 to 4096.
         deviations: Half-axes in standard deviations; 2 covers 86 % of positions.
         every: Every how many steps an ellipse is drawn; the last step is included.
 
@@ -125,7 +126,7 @@ def draw_reaches(
     """
     from PIL import Image, ImageDraw
 
-    size = integer("size", size, 16, unit="pixels")
+    size = integer("size", size, 16, 4096, unit="pixels")
     table = ellipse_table(gaussian, deviations=deviations, every=every)
     turn = np.linspace(0.0, 2 * np.pi, 49)
     along, across = table["major"].to_numpy()[:, None] * np.cos(turn), table["minor"].to_numpy()[:, None] * np.sin(turn)
@@ -148,5 +149,5 @@ def draw_reaches(
     for mean, goal in zip(gaussian.means_, gaussian.goals_, strict=True):
         points = pixels(mean[:, :2])
         pen.line(points, fill=colours[goal], width=3)
-        pen.text(points[-1], str(goal), fill=(20, 20, 20))
+        pen.text(points[-1], printable(str(goal)), fill=(20, 20, 20))
     return np.asarray(image)

@@ -180,7 +180,7 @@ class TimeSeriesGaussian(GoalPredictor):
         return -1 if self.band is None else int(self.band * self.n_samples)
 
     def _check_parameters(self) -> None:
-        integer("n_samples", self.n_samples, 2)
+        integer("n_samples", self.n_samples, 2, 10_000)
         choice("alignment", self.alignment, ("none", "mean", "medoid", "dba"))
         choice("online", self.online, ("open-end", "index", "fraction"))
         if self.band is not None:

@@ -16,7 +16,8 @@ from PIL import Image
 
 from benchmarks.cli import reproduce as reproducing
 from benchmarks.cli.app import main
-from benchmarks.reports.experiment_report import Section, write_experiment_report, write_tables
+from benchmarks.csv_tables import write_tables
+from benchmarks.reports.experiment_report import Section, write_experiment_report
 from benchmarks.reports.narrative import narrate
 from benchmarks.trials import run_trials
 from benchmarks.trials.functions import name_of

@@ -94,8 +94,8 @@ def test_every_combination_is_one_trial() -> None:
         ({"seeds": 10**9}, "`seeds` must be a list or an integer from 1"),
         ({"seeds": [1, -1]}, "`seeds` must be an integer >= 0, got -1"),
         ({"seeds": 900_000, "evaluations": [1, 2]}, "that makes 3,600,000 searches"),
-        ({"name": "a/b"}, "`name` must be a text without"),
-        ({"name": 3}, "`name` must be a text without .* got 3"),
+        ({"name": "a/b"}, "`name` must be the name of a file"),
+        ({"name": 3}, "`name` must be the name of a file .* got 3"),
         ({"workspace": ["overcooked"]}, "unknown key 'workspace' \\(did you mean `workspaces`\\?\\)"),
         ({"predictors": ["bayesian"], "people": {"population": "nobody"}}, "people of .*`population` must be one of"),
         (

@@ -234,8 +234,8 @@ def test_messages_about_files_begin_with_their_path(tmp_path):
             r"`subtasks\[0\].count` must be an integer from 1 to 1000, got 1000",
         ),
         (
-            lambda: TaskGraph.from_dict({"start": "s", "subtasks": TASK["subtasks"] * 257}),
-            "`subtasks` must have at most 256 entries, got 257",
+            lambda: TaskGraph.from_dict({"start": "s", "subtasks": TASK["subtasks"] * 129}),
+            "`subtasks` must have at most 128 entries, got 129",
         ),
         (
             lambda: TaskGraph.from_yaml("a: &a [x, x, x, x, x, x, x, x]\n" + ALIASES),

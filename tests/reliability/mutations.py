@@ -19,8 +19,8 @@ DEEP: Final = json.loads("[" * 150 + "]" * 150)
 
 HOSTILE: Final[tuple[Any, ...]] = (
     None, True, False, -1, 0, 1, 7, 255, 2**31, 2**63, -(2**63), 10**18, 10**400, 0.5, -0.0, 5e-324, 1e308, -1e308,
-    math.nan, math.inf, -math.inf, "", " ", "x", "x" * 100_000, "\0", "a\nb", "\ud800", "[/foo]", "=1+1", "../..", "nan",
-    "1", "b'bytes'", [], {}, [[]], [[[[]]]], [None, None], [0, 0], {"a": {}}, {"": None}, DEEP,
+    math.nan, math.inf, -math.inf, "", " ", "x", "x" * 100_000, "\0", "a\nb", "\ud800", "[/foo]", "=1+1", "../..",
+    "nan", "1", "b'bytes'", [], {}, [[]], [[[[]]]], [None, None], [0, 0], {"a": {}}, {"": None}, DEEP,
 )  # fmt: skip
 """What no file of ours holds in most places."""
 

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from benchmarks.csv_tables import write_tables
 from benchmarks.experiments.optimizers import narrative
 from benchmarks.experiments.optimizers.figures import anytime_figure
 from benchmarks.experiments.optimizers.sweep import LOCAL_SEARCH, METHODS, OPTIMUM_5X5, OURS, PAPER_METHODS, PUBLISHED
-from benchmarks.reports.experiment_report import Section, write_tables
+from benchmarks.reports.experiment_report import Section
 from legible_envs.drawing.charts import save_figure
 from predictors.evaluation.statistics import hedges_g, holm
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from benchmarks.experiments.prediction.sweep import LAYOUTS, POINTING_REFERENCE, REFERENCE
+from predictors.evaluation.omissions import markdown_row
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -96,6 +97,6 @@ def reference_rows(scores: pd.DataFrame) -> list[dict[str, str]]:
 def to_markdown(rows: Sequence[dict[str, str]]) -> str:
     """Rows as a Markdown table."""
     columns = list(rows[0])
-    lines = ["| " + " | ".join(columns) + " |", "| --- |" + " ---: |" * (len(columns) - 1)]
-    lines += ["| " + " | ".join(row[name] for name in columns) + " |" for row in rows]
+    lines = [markdown_row(columns), "| --- |" + " ---: |" * (len(columns) - 1)]
+    lines += [markdown_row([row[name] for name in columns]) for row in rows]
     return "\n".join(lines) + "\n"

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 import numpy as np
 import numpy.typing as npt
 
+from benchmarks.csv_tables import write_tables
 from benchmarks.experiments.recorded.sweep import BOOTSTRAPS, MIN_TRAJECTORIES
 from benchmarks.experiments.trial_rows import logged_rows
-from benchmarks.reports.experiment_report import Section, write_tables
+from benchmarks.reports.experiment_report import Section
 from predictors.evaluation.rank_correlation import detectable, spearman, spearman_rows
 
 if TYPE_CHECKING:

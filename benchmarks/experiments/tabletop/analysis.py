@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from benchmarks.csv_tables import write_tables
 from benchmarks.experiments.conditions import stacked, variance_rows
 from benchmarks.experiments.tabletop import figures, narrative, tables
-from benchmarks.reports.experiment_report import Section, write_tables
+from benchmarks.reports.experiment_report import Section
 from benchmarks.reports.narrative import narrate
 
 if TYPE_CHECKING:

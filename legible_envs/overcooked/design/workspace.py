@@ -202,7 +202,7 @@ class OvercookedWorkspace(Workspace):
         """``(n, d)`` random valid genomes, by rejecting whole layouts.
 
         Args:
-            n: How many.
+            n: How many, at most a million, and 2**27 numbers in all.
             rng: Source of randomness.
             obstacle_rate: Probability of each inner cell to be an obstacle before rejection (the paper's 20 %).
 
@@ -210,7 +210,7 @@ class OvercookedWorkspace(Workspace):
             LayoutError: The shape has no room for the stations; or two million draws in a row broke a rule: the rules
                 leave (almost) no room.
         """
-        check_draws(rng, n=n)
+        check_draws(rng, size=self.genome_size, n=n)
         obstacle_rate = real("obstacle_rate", obstacle_rate, 0, 1)
         if n and len(self.stations) > self.rules.most_stations:
             raise LayoutError(
@@ -237,7 +237,7 @@ class OvercookedWorkspace(Workspace):
         Each child differs by one change: a station moved to a free counter, two stations swapped, an obstacle added,
         or one removed. A parent that has no valid child repeats itself.
         """
-        check_draws(rng, k=k)
+        check_draws(rng, size=self.genome_size, parents=len(genomes), k=k)
         choice("phase", phase, range(self.phases))
         parents, valid = self._as_genomes(genomes)
         if not (valid & self.valid(parents)).all():

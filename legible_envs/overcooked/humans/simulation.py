@@ -32,6 +32,7 @@ from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.overcooked.reach import Reach, reach_of
 from legible_envs.overcooked.recipes import soup_task
 from legible_envs.overcooked.scoring.boltzmann import DEFAULT_RATIONALITY
+from legible_envs.rollouts.counts import check_participants
 from legible_envs.rollouts.trajectory import Trajectory
 from legible_envs.support.validation import integer, real
 from legible_envs.tasks import TaskGraph
@@ -206,13 +207,13 @@ def simulate_participants(
 
     Args:
         layout: The kitchen.
-        n: Number of participants.
+        n: Number of participants, at most 100,000.
         rng: Source of all randomness.
         task: The task over station types; the paper's three soups if None.
         player: Whose part of the kitchen the participants are in, by the number of their start.
         population: Each participant is drawn anew from it: ``"boltzmann"`` (also None) or ``"planner"``, or a
             callable that makes one participant's walker, called with (shape, rng).
-        executions: How often each participant does the task.
+        executions: How often each participant does the task; all together do at most a million.
         participant: Names are ``"{participant}/0"``, ``"{participant}/1"``, ….
         condition: Of all trajectories.
         layout_name: Of all trajectories.
@@ -225,7 +226,7 @@ def simulate_participants(
     task = task or soup_task()
     if population is None:
         population = "boltzmann"
-    n, executions = integer("n", n, 0), integer("executions", executions, 0)
+    n, executions = check_participants(n, executions)
     if isinstance(population, str) and population not in _POPULATIONS:
         raise ValueError(f"`population` must be one of {list(_POPULATIONS)} or a callable, got {population!r}")
     reach = reach_of(layout, player)

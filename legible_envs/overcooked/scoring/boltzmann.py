@@ -58,6 +58,8 @@ __all__ = [
 
 HumanName = Literal["shortest", "boltzmann"]
 
+LONGEST_HORIZON: Final = 8_192
+"""Steps; the default in the largest kitchen without a counter inside is shorter."""
 DEFAULT_RATIONALITY: Final = 1.3
 """Mean of the four recorded kitchens (1.67, 1.11, 1.29, 1.12 per step)."""
 
@@ -104,7 +106,9 @@ class HumanModel:
         longest = num_floor + 1
         horizon = 2 * longest if self.horizon is None else self.horizon
         unit = f"steps, the length of the longest conceivable shortest trajectory through {num_floor} cells"
-        return HumanModel(self.name, self.rationality, integer("horizon", horizon, longest, also="None", unit=unit))
+        return HumanModel(
+            self.name, self.rationality, integer("horizon", horizon, longest, LONGEST_HORIZON, also="None", unit=unit)
+        )
 
 
 def step_probabilities(

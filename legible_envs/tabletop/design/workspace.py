@@ -60,7 +60,7 @@ class TabletopWorkspace(Workspace):
             the path of a YAML file.
         condition: What is designed: ``"placement"`` of objects, ``"obstacles"`` on the sorted arrangement, or
             ``"both"``; a climb of the latter has two phases, objects first.
-        max_obstacles: Places for obstacles in a genome.
+        max_obstacles: Places for obstacles in a genome, at most 64.
         obstacle_size: Length and width of an obstacle in metres.
         max_detour: Every reach of the task is at most this many times its straight line; None for no limit.
         start_clearance: Obstacles keep this many metres off the places reaches start from.
@@ -235,7 +235,7 @@ class TabletopWorkspace(Workspace):
         Raises:
             LayoutError: Two million draws in a row broke a rule: the rules leave (almost) no room.
         """
-        check_draws(rng, n=n)
+        check_draws(rng, size=self.genome_size, n=n)
         genomes = np.zeros((n, self.genome_size))
         first = 0
         if self._home is not None and n:
@@ -260,7 +260,7 @@ class TabletopWorkspace(Workspace):
         Objects vary in phase 0, obstacles in phase 1 (under ``"obstacles"`` in phase 0, the only one);
         :func:`.perturb_genomes` documents the changes. A parent that has no valid child repeats itself.
         """
-        check_draws(rng, k=k)
+        check_draws(rng, size=self.genome_size, parents=len(genomes), k=k)
         choice("phase", phase, range(self.phases))
         parents = self._as_float(genomes)
         is_valid = self.valid(parents)
@@ -366,7 +366,7 @@ class TabletopWorkspace(Workspace):
         """The ranked objects from left to right, by rank, in initials where these tell them apart."""
         if self.condition == "obstacles" or self.second_measure != "order":
             return ()
-        initials = ["".join(part[0] for part in name.split("-")) for name in self.ranked]
+        initials = ["".join(part[:1] for part in name.split("-")) for name in self.ranked]
         names = initials if len(set(initials)) == len(initials) else list(self.ranked)
         return tuple(" ".join(p) for p in itertools.permutations(names))
 

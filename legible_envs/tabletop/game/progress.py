@@ -60,9 +60,7 @@ class TaskProgress:
     def __init__(self, task: TabletopTask) -> None:
         self.task = task
         self._space = task.graph.states
-        self._can_finish: dict[tuple[int, ...], bool] = {}
-        for (done, _), orders in self._space.completions.items():
-            self._can_finish[done] = self._can_finish.get(done, False) or orders > 0
+        self._can_finish = {done: orders > 0 for done, orders in self._space.completions.items()}
         self._goals: dict[tuple[tuple[int, ...], tuple[int, ...]], dict[str, Delivery]] = {}
         self._deliveries = {
             (number, goal): self._delivery(number, goal)

@@ -21,8 +21,9 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.errors import LayoutError
+from legible_envs.rollouts.counts import check_participants
 from legible_envs.rollouts.trajectory import Trajectory
-from legible_envs.support.validation import integer, real
+from legible_envs.support.validation import real
 from legible_envs.tabletop.geometry.paths import ShortestPaths
 from legible_envs.tabletop.humans.kernels import LEG, miss_goal, path_length, sample_reach, trace_path
 from legible_envs.tabletop.humans.model import Person, ReachModel
@@ -44,6 +45,8 @@ __all__ = [
 
 Floats = npt.NDArray[np.float64]
 
+FASTEST_RATE: Final = 10_000.0
+"""Samples per second."""
 _NO_BOXES: Final = np.empty((0, 6))
 _FARTHEST_BOW: Final = 0.5
 
@@ -249,11 +252,11 @@ def simulate_participants(
 
     Args:
         layout: The table, with the objects of the task.
-        n: Number of participants.
+        n: Number of participants, at most 100,000.
         rng: Source of all randomness.
         task: The task; the one of the package that has the layout's objects if None.
         population: Participants are drawn from it; the default population if None.
-        executions: How often each participant does the task.
+        executions: How often each participant does the task; all together do at most a million.
         participant: Names are ``"{participant}/0"``, ``"{participant}/1"``, ….
         condition: Of all trajectories.
         layout_name: Of all trajectories.
@@ -263,7 +266,7 @@ def simulate_participants(
         LayoutError: The task cannot be done on this table, or no task of the package has its objects.
         ValueError: A number out of range.
     """
-    n, executions = integer("n", n, 0), integer("executions", executions, 0)
+    n, executions = check_participants(n, executions)
     task, rate, surface = _checked_task(task, layout), _checked_rate(rate), Surface(layout)
     found: list[Trajectory] = []
     for number in range(n):
@@ -393,7 +396,7 @@ def _reach(
 
 
 def _checked_rate(rate: float) -> float:
-    return real("rate", rate, 0, closed="neither", unit="samples per second")
+    return real("rate", rate, 0, FASTEST_RATE, closed="right", unit="samples per second")
 
 
 def _checked_task(task: TabletopTask | None, layout: TabletopLayout) -> TabletopTask:

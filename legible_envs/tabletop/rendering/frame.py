@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 from legible_envs.support.validation import integer
 from legible_envs.tabletop.objects import Table
 
 __all__ = ["Frame", "check_width"]
+
+MOST_PIXELS: Final = 2**24
+"""Of a picture; those of 4,096 pixels squared have as many."""
 
 
 def check_width(width: int) -> int:
@@ -29,8 +33,18 @@ class Frame:
 
     @classmethod
     def of(cls, table: Table, width: int) -> Frame:
-        """The frame of a table."""
-        return cls(check_width(width), table.size)
+        """The frame of a table.
+
+        Raises:
+            ValueError: A width out of range, or a table so narrow that the picture would be too high.
+        """
+        frame = cls(check_width(width), table.size)
+        if frame.width * frame.height > MOST_PIXELS:
+            raise ValueError(
+                f"a picture {frame.width} pixels wide of a table of {table.size[0]:g} x {table.size[1]:g} m would be "
+                f"{frame.height:,} pixels high; expected at most {MOST_PIXELS:,} pixels in all"
+            )
+        return frame
 
     @property
     def margin(self) -> int:

@@ -54,6 +54,10 @@ def paste_centred(image: Image, sprite: Sprite, column: float, row: float) -> No
     paste(image, sprite, round(row - height / 2), round(column - width / 2))
 
 
+MOST_ACROSS: Final = 4096
+"""Pixels of an object's diagonal."""
+
+
 def paste_object(
     image: Image,
     frame: Frame,
@@ -76,7 +80,15 @@ def paste_object(
         angle: Radians; the object's own if None.
         faded: Whether it does not matter now.
         lifted: Whether it is carried, and throws a longer shadow.
+
+    Raises:
+        ValueError: It has no colour that can be drawn, or is far larger than the picture.
     """
+    if math.hypot(*obj.size) * frame.scale > MOST_ACROSS:
+        raise ValueError(
+            f"object {obj.name!r} of {obj.size[0]:g} x {obj.size[1]:g} m is too large to be drawn on a table of "
+            f"{frame.size[0]:g} x {frame.size[1]:g} m: more than {MOST_ACROSS:,} pixels across"
+        )
     turn = obj.angle if angle is None else float(angle)
     sprite = _sprite(
         colour_of(obj),

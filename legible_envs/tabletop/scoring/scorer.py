@@ -11,7 +11,7 @@ import numpy.typing as npt
 from legible_envs.errors import LayoutError
 from legible_envs.observer import ObserverModel
 from legible_envs.support.validation import integer
-from legible_envs.tabletop.layout import MAX_OBSTACLES, TabletopLayout
+from legible_envs.tabletop.layout import MAX_OBSTACLES, MOST_OBSTACLES, TabletopLayout
 from legible_envs.tabletop.objects import OBSTACLE_SIZE, numbers
 from legible_envs.tabletop.scoring import explanation
 from legible_envs.tabletop.scoring.exact_kernels import OUTPUTS, make_scratch, score_genomes, score_table
@@ -79,7 +79,7 @@ class TabletopScorer:
     ) -> None:
         self.task = explanation.as_task(task)
         self.observer = observer
-        max_obstacles = integer("max_obstacles", max_obstacles, 0)
+        max_obstacles = integer("max_obstacles", max_obstacles, 0, MOST_OBSTACLES)
         length, width = numbers(obstacle_size, 2, "`obstacle_size`", positive=True)
         self.max_obstacles = max_obstacles
         self.obstacle_size = (length, width)
