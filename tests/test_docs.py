@@ -17,6 +17,8 @@ PAGES = [
     if not {"_build", "examples"} & set(page.relative_to(ROOT).parts) and not page.name.startswith("Legible")
 ]
 
+LEARNING = (pytest.mark.slow, pytest.mark.timeout(900))
+
 
 def blocks(page: Path, language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", page.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
@@ -45,7 +47,15 @@ def own_registries(request):
 
 
 @pytest.mark.usefixtures("own_registries")
-@pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, "python")], ids=name_of)
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(page, id=name_of(page), marks=LEARNING if "stable_baselines3" in text else ())
+        for page in PAGES
+        for text in ["\n".join(blocks(page, "python"))]
+        if text
+    ],
+)
 def test_python_blocks_run_one_after_the_other(page, capsys, tmp_path, monkeypatch):
     if "stable_baselines3" in page.read_text(encoding="utf-8"):
         pytest.importorskip("stable_baselines3", reason="the extra `rl`, which `make test TORCH=` goes without")

@@ -95,6 +95,7 @@ def test_no_network_is_one_line_not_an_error(monkeypatch: pytest.MonkeyPatch, tm
     assert recorded_play(tmp_path) == {"note": "Recorded play was left out: no package index can be reached"}
 
 
+@pytest.mark.slow
 @pytest.mark.data
 def test_recorded_play_agrees_with_every_walk_scored_by_itself() -> None:
     from benchmarks.experiments.prediction.run import score_every_trajectory

@@ -80,6 +80,7 @@ def test_targets() -> None:
     assert not Target("<=", 2.0).met_by(2.1)
 
 
+@pytest.mark.slow
 def test_the_whole_benchmark_reports_every_promise(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(run, "starting", lambda settings: [Figure("import", "import", "s", (0.1,)),
                                                            Figure("compile", "compile", "s", (9.0,))])  # fmt: skip

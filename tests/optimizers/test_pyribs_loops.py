@@ -88,6 +88,7 @@ def pyribs_loop(workspace, make, rounds=8, *, bounded):
     return archive
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("workspace", WORKSPACES.values(), ids=WORKSPACES)
 @pytest.mark.parametrize("emitter", EMITTERS)
 def test_every_stock_emitter_runs_unchanged(emitter, workspace):
@@ -102,6 +103,7 @@ def test_every_stock_emitter_runs_unchanged(emitter, workspace):
         assert workspace.legibility(workspace.encode(layout)) == pytest.approx(archive.best_elite["objective"])
 
 
+@pytest.mark.slow
 def test_other_archives_and_schedulers_of_pyribs_run_too():
     space = KITCHEN.continuous()
     archive = CVTArchive(solution_dim=space.solution_dim, centroids=50, ranges=space.archive_ranges, seed=0)

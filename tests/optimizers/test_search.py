@@ -44,6 +44,7 @@ def test_finds_the_best_layout_of_every_cell():
     assert result.coverage == 1.0
 
 
+@pytest.mark.slow
 def test_finds_the_exhaustive_optimum_of_5x5_with_default_settings():
     result = search(OvercookedWorkspace(shape=(5, 5), prefix="sum"), seed=0)
     assert result.best_objective == pytest.approx(OPTIMUM_5X5, abs=1e-9)
@@ -353,6 +354,7 @@ def test_ctrl_c_finishes_the_batch_saves_and_brings_the_result(tmp_path, same_ar
     assert same_archive(whole.archive, search(SHELF, evaluations=100_000).archive)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("ctrl_c_interrupts")
 def test_ctrl_c_from_outside_leaves_a_usable_run(tmp_path):
     program = textwrap.dedent("""

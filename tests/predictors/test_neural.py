@@ -299,6 +299,7 @@ def test_files_of_others_are_refused(on_reaches: NeuralPredictor, tmp_path: Path
         type(on_reaches).load(tmp_path / "cut.npz")
 
 
+@pytest.mark.slow
 def test_without_torch(tmp_path: Path) -> None:
     """Importing, making, loading, predicting and streaming do not even look for torch; fitting says what to install."""
     names = [type(p).__name__ for p in (SMALL[0], SMALL[2])]

@@ -289,6 +289,7 @@ def test_spread_and_ellipses() -> None:
 # -- real pointing ----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @needs_pointing
 @pytest.mark.parametrize(
     ("predictor", "published"),
@@ -298,7 +299,7 @@ def test_spread_and_ellipses() -> None:
         (TimeSeriesGaussian(online="index"), 0.723),
         (TimeSeriesGaussian(), 0.711),
         (TimeSeriesGaussian(online="index", velocity=True), 0.757),
-        pytest.param(ReachLogistic(), 0.776, marks=pytest.mark.slow),
+        (ReachLogistic(), 0.776),
     ],
     ids=lambda value: repr(value)[:50],
 )
@@ -306,12 +307,14 @@ def test_real_pointing_reaches_the_published_accuracy(predictor: GoalPredictor, 
     assert grouped_accuracy(predictor) == pytest.approx(published, abs=0.015)
 
 
+@pytest.mark.slow
 @needs_pointing
 def test_newest_sample_and_velocity_read_real_pointing_better() -> None:
     assert grouped_accuracy(TimeSeriesGaussian(velocity=True, half_life=0)) > 0.77
     assert grouped_accuracy(ReachNeighbours()) > 0.78
 
 
+@pytest.mark.slow
 @needs_pointing
 def test_literal_warping_to_a_medoid_is_the_worst_on_real_pointing() -> None:
     literal = TimeSeriesGaussian(alignment="medoid", band=None)

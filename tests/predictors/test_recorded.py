@@ -45,6 +45,7 @@ def test_all_predictors_are_as_accurate_as_measured_before() -> None:
     assert fixed["difference"].abs().max() < 0.003
 
 
+@pytest.mark.slow
 @pytest.mark.data
 def test_untrained_predictors_are_as_accurate_as_measured_before() -> None:
     scores = score_recorded_play(predictors=UNTRAINED, repeats=1)
@@ -66,6 +67,7 @@ def test_untrained_predictors_are_as_accurate_as_measured_before() -> None:
     assert table.columns.tolist() == ["walks", *columns, "mean", "chance"]
 
 
+@pytest.mark.slow
 @pytest.mark.data
 def test_candidates_of_the_running_game_are_judged_apart() -> None:
     rows = score_every_trajectory(layouts=("cramped_room",), fractions=(0.5,), candidate_set="game", repeats=1)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 import pytest
+from pydantic import Field
 
 from legible_envs.errors import TaskError
 from legible_envs.support.models import Choice, FileModel, Flag, Length, Real, Text, Whole, validated
@@ -13,12 +14,12 @@ from legible_envs.support.models import Choice, FileModel, Flag, Length, Real, T
 class Part(FileModel):
     name: Annotated[str, Text(20)]
     count: Annotated[int, Whole(1, 1000)] = 1
-    at: Annotated[list[Annotated[float, Real(0, 1)]], Length(2, 2)] = [0.0, 0.0]
+    at: Annotated[list[Annotated[float, Real(0, 1)]], Length(2, 2)] = Field(default=[0.0, 0.0])
 
 
 class Content(FileModel):
     parts: Annotated[list[Part], Length(1, 3)]
-    groups: dict[str, list[str]] = {}
+    groups: dict[str, list[str]] = Field(default={})
     most: Annotated[int, Whole(1)] | None = None
     shared: Part | None = None
     kind: Annotated[str, Choice("a", "b")] = "a"

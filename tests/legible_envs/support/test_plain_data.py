@@ -94,13 +94,13 @@ def test_a_long_key_is_no_long_text():
 
 @pytest.mark.parametrize("parse", [parse_json, parse_toml, parse_yaml])
 def test_random_characters_give_data_or_a_value_error(parse):
-    rng, messages = random.Random(5), set()
+    rng = random.Random(5)
     alphabet = "[]{}(),:=&*!?|>-'\"%@`#<~ \n\t0123456789.eabnx_\\/\u2028é\x00"
+    refused = 0
     for _ in range(3000):
         text = "".join(rng.choices(alphabet, k=rng.randrange(1, 40)))
         try:
             parse(text)
-        except ValueError as error:
-            messages.add(str(error))
-    assert len(messages) > 5
-    assert "" not in messages
+        except ValueError:
+            refused += 1
+    assert refused > 1000

@@ -204,6 +204,7 @@ def test_gradients_of_genomes_are_slopes_of_the_objective(ws, objective):
         np.testing.assert_allclose(gradients[:, 0, gene], slope, atol=1e-4)
 
 
+@pytest.mark.slow
 def test_gradients_lead_a_search_uphill(ws):
     settings = {"evaluations": 1500, "initial": 200, "progress": False}
     led = search(ws, emitter="gradient-arborescence", seed=0, **settings)

@@ -150,6 +150,7 @@ def read_by_lines(model: ReachModel | None) -> npt.NDArray[np.float64]:
     return np.asarray(right.mean(axis=0))
 
 
+@pytest.mark.slow
 @needs_pointing
 def test_refitted_people_are_read_like_recorded_ones_and_plain_minimum_jerk_is_not() -> None:
     recorded = read_by_lines(None)

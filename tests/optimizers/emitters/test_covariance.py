@@ -10,6 +10,7 @@ from tests.support.valley_workspace import Valley
 SHELF = ShelfWorkspace()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "share"), [("cma-me", 0.2), ("cma-mae", 0.1)])
 def test_evolution_strategies_climb_the_valley(name, share):
     workspace = Valley()

@@ -389,6 +389,7 @@ def test_the_examples_of_the_contract_can_be_evaluated() -> None:
     assert len(evaluate("bayesian", example_trajectories(), cv=2, repeats=1, rare="keep").table) == 8 * 9
 
 
+@pytest.mark.slow
 @pytest.mark.data
 def test_recorded_people_are_read_as_measured_before() -> None:
     from legible_envs.datasets.overcooked_2019 import recorded_trajectories

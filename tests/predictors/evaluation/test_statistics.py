@@ -171,6 +171,7 @@ def null_experiment(rng: np.random.Generator, people: int = 10, walks: int = 12)
     return pd.concat(parts, ignore_index=True)
 
 
+@pytest.mark.slow
 def test_a_true_null_is_rejected_at_the_level_by_participants_and_far_too_often_by_folds() -> None:
     rng, rounds = np.random.default_rng(2024), 200
     rejected = {"participant": 0, "fold": 0}
@@ -187,6 +188,7 @@ def test_a_true_null_is_rejected_at_the_level_by_participants_and_far_too_often_
     assert rejected["fold"] > 0.3 * rounds, rejected
 
 
+@pytest.mark.slow
 def test_within_participants_keeps_its_level_too() -> None:
     rng, rounds, rejected = np.random.default_rng(8), 200, 0
     for _ in range(rounds):
