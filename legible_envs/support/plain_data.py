@@ -24,6 +24,7 @@ __all__ = [
     "MOST_CHARACTERS_OF_TOML",
     "MOST_CHARACTERS_OF_YAML",
     "MOST_ENTRIES_OF_YAML",
+    "MOST_MARKS_OF_YAML",
     "check_plain",
     "parse_json",
     "parse_toml",
@@ -39,11 +40,16 @@ MOST_CHARACTERS_OF_TOML: Final = 500_000
 MOST_CHARACTERS_OF_YAML: Final = 50_000
 """Longest YAML that is read; its reader takes up to 20 microseconds a character."""
 
+MOST_MARKS_OF_YAML: Final = 12_000
+"""Most brackets, commas, colons, dashes and other marks of YAML in a text; its reader takes 50 microseconds a mark."""
+
 MOST_ENTRIES_OF_YAML: Final = 100_000
 """Most values of a YAML file, those repeated by aliases counted as often as they are named."""
 
 _BITS: Final = 128  # seeds may be that long
 _LEVELS: Final = 100
+_MARKS: Final = re.compile(r"[\[\]{},:?&*!-]")
+_BRACKETS: Final = re.compile(r"[\[\]{}]")
 _LONG_KEY: Final = re.compile(r"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){100}")
 
 
@@ -88,12 +94,25 @@ def parse_yaml(text: str) -> Any:
     """Read YAML 1.1 of plain data, aliases included.
 
     Raises:
-        ValueError: It is not YAML, or more than plain data; longer than :data:`MOST_CHARACTERS_OF_YAML`; its values,
-            aliases unfolded, are more than :data:`MOST_ENTRIES_OF_YAML` or nested more than 100 levels deep; a key
-            stands twice, or a number is not finite or longer than 128 bits. Says where.
+        ValueError: It is not YAML, or more than plain data; longer than :data:`MOST_CHARACTERS_OF_YAML`, with
+            more marks than :data:`MOST_MARKS_OF_YAML`; its values, aliases unfolded, are more than
+            :data:`MOST_ENTRIES_OF_YAML` or nested more than 100 levels deep; a key stands twice, or a number is not finite or longer than 128 bits. Says where.
     """
     _check_length(text, MOST_CHARACTERS_OF_YAML, "YAML")
+    if (marks := len(_MARKS.findall(text))) > MOST_MARKS_OF_YAML:
+        raise ValueError(f"it has {marks:,} brackets, commas, colons and such; at most {MOST_MARKS_OF_YAML:,} are read")
+    if _open_brackets(text) > 2 * _LEVELS:  # its reader takes time as the square of these
+        raise _too_deep()
     return _checked("YAML", lambda: _load_yaml(text))
+
+
+def _open_brackets(text: str) -> int:
+    """The most brackets that stand open at a time, those in quotes taken for brackets, too."""
+    depth = most = 0
+    for bracket in _BRACKETS.findall(text):
+        depth = depth + 1 if bracket in "[{" else max(depth - 1, 0)
+        most = max(most, depth)
+    return most
 
 
 def _check_length(text: str, most: int, kind: str) -> None:
