@@ -94,9 +94,10 @@ def parse_yaml(text: str) -> Any:
     """Read YAML 1.1 of plain data, aliases included.
 
     Raises:
-        ValueError: It is not YAML, or more than plain data; longer than :data:`MOST_CHARACTERS_OF_YAML`, with
-            more marks than :data:`MOST_MARKS_OF_YAML`; its values, aliases unfolded, are more than
-            :data:`MOST_ENTRIES_OF_YAML` or nested more than 100 levels deep; a key stands twice, or a number is not finite or longer than 128 bits. Says where.
+        ValueError: It is not YAML, or more than plain data; longer than :data:`MOST_CHARACTERS_OF_YAML`, with more
+            marks than :data:`MOST_MARKS_OF_YAML`; its values, aliases unfolded, are more than
+            :data:`MOST_ENTRIES_OF_YAML` or nested more than 100 levels deep; a key stands twice, or a number is not
+            finite or longer than 128 bits. Says where.
     """
     _check_length(text, MOST_CHARACTERS_OF_YAML, "YAML")
     if (marks := len(_MARKS.findall(text))) > MOST_MARKS_OF_YAML:

@@ -6,6 +6,7 @@ import json
 import random
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -45,13 +46,17 @@ class Format:
             return self.write(example)
         return npz_bytes(example) if isinstance(example, dict) else example
 
+    @cached_property
+    def wholes(self) -> tuple[bytes, ...]:
+        """The bytes of all valid files, archives compressed and not."""
+        plain = (npz_bytes(e, compressed=False) for e in self.examples if self.write is None and isinstance(e, dict))
+        return (*map(self.whole, self.examples), *plain)
+
     def damaged(self, rng: random.Random) -> bytes:
         """The bytes of a damaged file."""
         example = rng.choice(self.examples)
         if rng.random() < 0.4 or isinstance(example, bytes):
-            others = tuple(map(self.whole, self.examples))
-            content = npz_bytes(example, compressed=False) if isinstance(example, dict) and self.write is None else None
-            return damage_bytes(content or self.whole(example), rng, others)
+            return damage_bytes(rng.choice(self.wholes), rng, self.wholes)
         if self.write is not None:
             return self.write(damage_data(example, rng))
         if self.inner and rng.random() < 0.5:

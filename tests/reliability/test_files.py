@@ -40,7 +40,7 @@ def attempts(name: str, count: int, folder: Path) -> Outcome:
     path = folder / f"file{known.suffix}"
     for example in known.examples:
         path.write_bytes(known.whole(example))
-        known.use(path)
+        known.use(path)  # also imports and compiles what reading takes
     messages: set[str] = set()
     before, accepted, slowest = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, 0, 0.0
     for number in range(count):

@@ -113,7 +113,7 @@ def _arrays(
     for field, (kinds, shape, most) in wanted.items():
         array = stored_array(file, f"{name}/{field}", kinds, shape, finite=True)
         least = -most if kinds == "f" else 0
-        if array.size and not least <= array.min() <= array.max() <= most:
+        if array.size and not least <= float(array.min()) <= float(array.max()) <= most:
             raise ValueError(f"`{name}/{field}` must be numbers from {least} to {most}")
         arrays[field] = array
     cells = arrays["cells"].reshape(-1, 2)

@@ -8,7 +8,7 @@ import tomllib
 
 import pytest
 import yaml
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from legible_envs.support.plain_data import parse_json, parse_toml, parse_yaml
@@ -23,6 +23,7 @@ SCALARS = st.one_of(
 PLAIN = st.recursive(SCALARS, lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(), inner, max_size=4))
 
 
+@settings(deadline=None)
 @given(PLAIN)
 def test_json_and_yaml_of_plain_data_are_read_as_they_are(data):
     assert parse_json(json.dumps(data)) == data
