@@ -80,7 +80,7 @@ def save_trajectories(path: str | os.PathLike[str], trajectories: Iterable[Traje
         "trajectories": records,
     }
     states = [np.zeros((0, dimension), dtype=dtype), *(each.states for each in trajectories if each.num_states)]
-    arrays = {
+    arrays: dict[str, Any] = {
         "kind": _KIND,
         "schema": _least_schema(kinds, records),
         "states": np.concatenate(states),

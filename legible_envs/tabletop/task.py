@@ -154,7 +154,8 @@ class TabletopTask:
         except ValueError as error:
             raise TaskError(str(error)) from error
         graph = TaskGraph.from_dict(content.task)
-        return cls(content.name, TabletopLayout.from_content(content), graph, content.configuration)
+        places = {name: (x, y) for name, (x, y) in content.configuration.items()}
+        return cls(content.name, TabletopLayout.from_content(content), graph, places)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data that :meth:`from_dict` reads back to an equal task."""

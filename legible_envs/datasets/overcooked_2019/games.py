@@ -82,7 +82,7 @@ def _read_kitchen(file: Mapping[str, Any], name: str) -> list[tuple[int, Recorde
     arrays = _arrays(file, name, layout, int(counts.sum()), len(counts))
     found, tick, state = [], 0, 0
     for number, (order, ticks) in enumerate(zip(orders.tolist(), counts.tolist(), strict=True)):
-        parts = {field: arrays[field][state : state + ticks + 1] for field in PER_STATE}
+        parts: dict[str, Any] = {field: arrays[field][state : state + ticks + 1] for field in PER_STATE}
         parts |= {field: arrays[field][tick : tick + ticks] for field in PER_TICK}
         game = RecordedGame(
             layout_name=name, layout=layout, pair=str(pairs[number]), split=str(splits[number]), **parts
