@@ -47,18 +47,18 @@ class Assignment(click.ParamType):
 
 
 def typed_value(text: str) -> Any:
-    """A value as a TOML or JSON file has it, or the text itself where it is neither (or a date, infinite or no number).
+    """A value as a TOML or JSON file has it, or the text itself where it is neither (or a date).
 
     Example:
         >>> [typed_value(text) for text in ("0.5", "true", "[7, 7]", "sum", "'7'", "null")]
         [0.5, True, [7, 7], 'sum', '7', None]
     """
     try:
-        return parse_json(text)
+        return parse_json(text, finite=False)
     except ValueError:
         pass
     try:
-        found = parse_toml(f"value = {text}")
+        found = parse_toml(f"value = {text}", finite=False)
     except ValueError:
         return text
     return text if found.keys() != {"value"} else found["value"]

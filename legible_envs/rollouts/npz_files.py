@@ -30,7 +30,7 @@ from legible_envs.layout_kinds import LayoutKind, kind_named, kind_of
 from legible_envs.rollouts.trajectory import Trajectory
 from legible_envs.support.file_kinds import describe_file
 from legible_envs.support.files import open_npz, write_npz
-from legible_envs.support.stored_arrays import stored_array, stored_json, stored_whole
+from legible_envs.support.stored_arrays import says, stored_array, stored_json, stored_whole
 
 if TYPE_CHECKING:
     from legible_envs.rollouts.records import TrajectoryRecord
@@ -129,7 +129,7 @@ def is_npz_of_trajectories(path: str | os.PathLike[str]) -> bool:
 
 
 def _is_ours(file: Mapping[str, Any]) -> bool:
-    return "kind" in file and str(file["kind"])[: len(_KIND) + 1] == _KIND
+    return says(file, "kind", _KIND)
 
 
 def _rebuild(file: Mapping[str, Any]) -> list[Trajectory]:

@@ -76,8 +76,12 @@ def parse_json(text: str, *, finite: bool = True, most: int = MOST_CHARACTERS) -
     return _checked("JSON", lambda: json.loads(text, object_pairs_hook=_without_repeats), finite=finite)
 
 
-def parse_toml(text: str) -> dict[str, Any]:
+def parse_toml(text: str, *, finite: bool = True) -> dict[str, Any]:
     """Read TOML.
+
+    Args:
+        text: The whole text.
+        finite: Whether NaN and infinities are refused.
 
     Raises:
         ValueError: It is not TOML; longer than :data:`MOST_CHARACTERS_OF_TOML`; nested more than 100 levels deep; or it
@@ -86,7 +90,7 @@ def parse_toml(text: str) -> dict[str, Any]:
     _check_length(text, MOST_CHARACTERS_OF_TOML, "TOML")
     if _LONG_KEY.search(text):  # its reader takes seconds for a key of thousands of parts
         raise _too_deep()
-    data: dict[str, Any] = _checked("TOML", lambda: tomllib.loads(text))
+    data: dict[str, Any] = _checked("TOML", lambda: tomllib.loads(text), finite=finite)
     return data
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from typing import Any, Final
 
@@ -11,7 +12,7 @@ import numpy.typing as npt
 from legible_envs.support.plain_data import MOST_CHARACTERS, parse_json
 from legible_envs.support.validation import LARGEST, integer
 
-__all__ = ["stored_array", "stored_json", "stored_text", "stored_whole"]
+__all__ = ["says", "stored_array", "stored_json", "stored_text", "stored_whole"]
 
 _KINDS: Final = {"b": "truth values", "iu": "whole numbers", "f": "floats", "iuf": "numbers", "U": "texts"}
 _LONGEST_TEXT: Final = 1_000_000
@@ -52,10 +53,18 @@ def stored_array(
         raise ValueError(
             f"`{name}` must be {_KINDS[kinds]} of shape ({wanted}), got {array.dtype} of shape {array.shape}"
         )
+    if array.dtype.kind == "U" and not _is_text(array):
+        raise ValueError(f"`{name}` is no text: it holds numbers beyond the last letter of Unicode")
     if finite and array.dtype.kind == "f" and not np.isfinite(array).all():
         place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise ValueError(f"`{name}` must be finite, got {array[place]} at {list(place)}")
     return array
+
+
+def _is_text(array: npt.NDArray[Any]) -> bool:
+    """Whether texts can be made of an array; Python ends in a SystemError where they cannot."""
+    native = array.astype(array.dtype.newbyteorder("=")).reshape(-1)
+    return not native.dtype.itemsize or not native.size or int(native.view(np.uint32).max()) <= sys.maxunicode
 
 
 def stored_text(file: Mapping[str, Any], name: str) -> str:
@@ -67,10 +76,16 @@ def stored_text(file: Mapping[str, Any], name: str) -> str:
     array = stored_array(file, name, "U", ())
     if array.dtype.itemsize > 4 * _LONGEST_TEXT:
         raise ValueError(f"`{name}` has room for {array.dtype.itemsize // 4:,} characters; at most {_LONGEST_TEXT:,}")
-    try:
-        return str(array[()])
-    except ValueError as error:  # numbers beyond the last letter of Unicode
-        raise ValueError(f"`{name}` is no text: {error}") from error
+    return str(array[()])
+
+
+def says(file: Mapping[str, Any], name: str, text: str) -> bool:
+    """Whether a file holds a text under a name; False where it holds anything else.
+
+    Raises:
+        ValueError: The array is damaged.
+    """
+    return name in file and file[name].shape == () and file[name].dtype.kind == "U" and bool(file[name] == text)
 
 
 def stored_whole(file: Mapping[str, Any], name: str, low: int, high: int = LARGEST) -> int:

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import Cut, Trajectory
 from legible_envs.support.files import open_npz, write_npz
-from legible_envs.support.stored_arrays import stored_array, stored_json, stored_whole
+from legible_envs.support.stored_arrays import says, stored_array, stored_json, stored_whole
 from legible_envs.support.validation import integer, real
 from predictors.base import (
     FRACTIONS,
@@ -213,7 +213,7 @@ class NeuralPredictor(GoalPredictor):
         """
         try:
             with open_npz(path) as file:
-                if "kind" not in file or str(file["kind"])[: len(_KIND) + 1] != _KIND:
+                if not says(file, "kind", _KIND):
                     raise ValueError("it is not a file of a neural predictor")
                 schema = stored_whole(file, "schema", 1)
                 if schema > SCHEMA:

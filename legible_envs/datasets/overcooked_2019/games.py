@@ -12,7 +12,7 @@ import numpy.typing as npt
 from legible_envs.datasets.overcooked_ai.games import PER_STATE, PER_TICK, RecordedGame, RecordingsError
 from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.support.files import open_npz, write_npz
-from legible_envs.support.stored_arrays import stored_array, stored_text, stored_whole
+from legible_envs.support.stored_arrays import says, stored_array, stored_text, stored_whole
 
 __all__ = ["read_games", "write_games"]
 
@@ -52,7 +52,7 @@ def read_games(path: Path, layouts: Iterable[str] | None = None) -> list[Recorde
     """
     try:
         with open_npz(path, most_arrays=_MOST_ARRAYS) as file:
-            if "kind" not in file or str(file["kind"])[: len(_KIND) + 1] != _KIND:
+            if not says(file, "kind", _KIND):
                 raise RecordingsError(f"{path} does not hold recorded games")
             schema = stored_whole(file, "schema", 1)
             if schema != SCHEMA:
