@@ -297,7 +297,8 @@ def test_files_of_others_are_refused(on_reaches: NeuralPredictor, tmp_path: Path
             type(on_reaches).load(tmp_path / "bad.npz")
     for name, changes in (
         ("unknown parameters", {"parameters": {"units": 3}}),
-        ("fit its parameters", {"parameters": {"members": 10**9, "num_layers": 10**9}}),
+        ("`num_layers` must be an integer from 1", {"parameters": {"num_layers": 10**9}}),
+        ("fit its parameters", {"parameters": {"members": 64, "num_layers": 64}}),
         (r"`classes\[0\]` must be a non-empty text, got 3", {"classes": [3]}),
         ("`encoding` must be a mapping", {"encoding": []}),
         ("it holds a 'x' predictor", {"predictor": "x"}),
