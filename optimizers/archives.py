@@ -137,7 +137,7 @@ def read_archive(path: Path) -> dict[str, npt.NDArray[Any]]:
         FileNotFoundError: There is no such file.
         OSError: It cannot be read.
         SearchError: It is not such an archive: an array is missing, of another kind or shape than the others say, not
-            finite, or cells do not rise.
+            finite, or a cell is there twice.
     """
     refusal = f"{path} is not an archive written by a search, or it is damaged"
     try:
@@ -148,8 +148,8 @@ def read_archive(path: Path) -> dict[str, npt.NDArray[Any]]:
             objective = stored_array(stored, "objective", "f", (None,), finite=True)
             rows = len(objective)
             index = stored_array(stored, "index", "iu", (rows,))
-            if rows and (index[0] < 0 or (index[1:] <= index[:-1]).any()):
-                raise ValueError("`index` must hold numbers of cells from 0 on that rise")
+            if rows and (index.min() < 0 or len(np.unique(index)) < rows):
+                raise ValueError("`index` must hold numbers of cells from 0 on, each once")
             arrays = {
                 "solution": stored_array(stored, "solution", "iuf", (rows, None), finite=True),
                 "objective": objective,

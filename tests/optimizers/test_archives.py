@@ -118,8 +118,8 @@ def test_a_damaged_file_is_refused_by_name(tmp_path, damage):
         ({"objective": np.array(0.5)}, r"`objective` must be floats of shape \(any\), got float64 of shape \(\)"),
         ({"solution": np.zeros((3, 2))}, r"`solution` must be .* of shape \(2, any\), got float64 of shape \(3, 2\)"),
         ({"measures": np.zeros(2)}, r"`measures` must be numbers of shape \(2, any\)"),
-        ({"index": np.array([4, 4])}, "`index` must hold numbers of cells from 0 on that rise"),
-        ({"index": np.array([-1, 4])}, "`index` must hold numbers of cells from 0 on that rise"),
+        ({"index": np.array([4, 4])}, "`index` must hold numbers of cells from 0 on, each once"),
+        ({"index": np.array([-1, 4])}, "`index` must hold numbers of cells from 0 on, each once"),
         ({"index": np.array([[1], [2]], dtype=object)}, "pickled objects, which are never loaded"),
     ],
 )

@@ -285,6 +285,7 @@ def test_files_of_others_are_refused(on_reaches: NeuralPredictor, tmp_path: Path
     with pytest.raises(FileNotFoundError):
         RecurrentPredictor.load(tmp_path / "nothing.npz")
     arrays = dict(np.load(path))
+    parameters = json.loads(arrays["config"].tobytes())["parameters"]
     for name, changes in (
         ("kind", {"kind": "something"}),
         ("schema", {"schema": 99}),
@@ -298,7 +299,7 @@ def test_files_of_others_are_refused(on_reaches: NeuralPredictor, tmp_path: Path
     for name, changes in (
         ("unknown parameters", {"parameters": {"units": 3}}),
         ("`num_layers` must be an integer from 1", {"parameters": {"num_layers": 10**9}}),
-        ("fit its parameters", {"parameters": {"members": 64, "num_layers": 64}}),
+        ("fit its parameters", {"parameters": {**parameters, "num_layers": 64}}),
         (r"`classes\[0\]` must be a non-empty text, got 3", {"classes": [3]}),
         ("`encoding` must be a mapping", {"encoding": []}),
         ("it holds a 'x' predictor", {"predictor": "x"}),

@@ -174,7 +174,10 @@ def test_other_files_are_refused(tmp_path: Path) -> None:
         ({"actions": np.array([0, 6])}, "`actions` must be numbers from 0 to 5"),
         ({"episodes": np.array([0, 7])}, "`episodes` must count the games from 0"),
         ({"rewards": np.zeros(3)}, r"`rewards` must be floats of shape \(2\), got float64 of shape \(3,\)"),
-        ({"about": np.array(str(arrays["about"]).replace('"onion"', '"cake"'))}, r"`recipes\[0\]\[0\]` must be one of"),
+        (
+            {"about": np.array(str(arrays["about"]).replace('"onion"', '"cake"'))},
+            r"`about`: `recipes\[0\]\[0\]` must be one of",
+        ),
         ({"about": np.array("[1]")}, "`about` must be a mapping, got"),
     ):
         np.savez(tmp_path / "mine.npz", **{**arrays, **changes})
