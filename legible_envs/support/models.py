@@ -142,7 +142,8 @@ def validated(model: type[Model], data: object, what: str = "", *, error: MakeEr
         found = _telling_first(refusal.errors(include_url=False))
         more = f" ({len(found) - 1} more {'is' if len(found) == 2 else 'are'} wrong)" if len(found) > 1 else ""
         said = _said(model, found[0], what)
-        raise error(f"{what}: {said}{more}" if what and "`" in said[:1] else f"{said}{more}") from None
+        is_placed = not what or said.startswith(what) or not said.startswith("`")
+        raise error(f"{said}{more}" if is_placed else f"{what}: {said}{more}") from None
 
 
 def as_plain(data: object) -> Any:
