@@ -106,7 +106,7 @@ def kind_named(name: str) -> LayoutKind:
         LayoutError: There is none, and the message names the known ones and the entry point group; or it cannot be
             imported.
     """
-    if name not in _registry.list():
+    if name not in _registry:
         raise LayoutError(
             f"no layout kind named {name!r}; known: {list_layout_kinds()}. A package adds one under the entry point "
             f"group {GROUP!r}, a program with `register_layout_kind`",
@@ -140,8 +140,11 @@ def kind_of_line(line: str) -> LayoutKind | None:
 
 def _usable() -> Iterator[LayoutKind]:
     """All kinds that can be imported, built-in ones first: a broken plug-in spoils nothing that is not its own."""
+    first = _registry.built_in()
+    yield from map(_registry.resolve, first)
     for name in _registry.list():
         try:
-            yield _registry.resolve(name)
+            if name not in first:
+                yield _registry.resolve(name)
         except LayoutError:
             continue

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from legible_envs.errors import TaskError
 from legible_envs.support.names import is_whole
-from legible_envs.support.text import clean_text, dump_yaml, read_text
+from legible_envs.support.text import dump_yaml, read_source
 from legible_envs.support.validation import entries, integer, shown
 from legible_envs.task_states import MAX_SUBTASKS, StateSpace, SubtaskClass
 
@@ -318,23 +318,18 @@ class TaskGraph:
         Raises:
             TaskError: A missing or unknown key, or anything :class:`TaskGraph` rejects.
         """
-        if not isinstance(data, Mapping):
-            raise TaskError(f"a task must be a mapping with keys `start` and `subtasks`, got {type(data).__name__}")
-        _check_keys(data, required={"start", "subtasks"}, optional={"groups", "max_open"}, where="the task")
-        listed = data["subtasks"]
-        if isinstance(listed, str) or not isinstance(listed, Sequence):
-            raise TaskError(f"`subtasks` must be a list, got {type(listed).__name__}")
-        subtasks = []
-        for number, entry in enumerate(listed, 1):
-            if not isinstance(entry, Mapping):
-                raise TaskError(f"subtask number {number} must be a mapping, got {type(entry).__name__}")
-            _check_keys(entry, {"name", "goals"}, {"after", "then", "count"}, f"subtask number {number}")
-            # YAML reads `after:` with nothing behind it as null; people mean "nothing".
-            subtasks.append(Subtask(**{key: value for key, value in entry.items() if value is not None}))
-        groups = data.get("groups") or {}
-        if not isinstance(groups, Mapping):
-            raise TaskError(f"`groups` must map group names to lists of subtasks, got {type(groups).__name__}")
-        return cls(subtasks, data["start"], groups, data.get("max_open"))
+        from legible_envs.support.models import as_plain, validated
+        from legible_envs.task_files import TaskContent
+
+        try:
+            content = validated(TaskContent, as_plain(data), "the task")
+            subtasks = [
+                Subtask(entry.name, tuple(entry.goals), tuple(entry.after), tuple(entry.then), entry.count)
+                for entry in content.subtasks
+            ]
+            return cls(subtasks, content.start, content.groups, content.max_open)
+        except ValueError as error:
+            raise TaskError(str(error)) from error
 
     def to_yaml(self, path: str | Path | None = None) -> str:
         """Return the task as YAML text, and write it to ``path`` if given."""
@@ -351,18 +346,14 @@ class TaskGraph:
             TaskError: The text is not YAML, or not a task.
             FileNotFoundError: The file does not exist.
         """
-        import yaml
+        from legible_envs.support.plain_data import parse_yaml
 
-        is_file = isinstance(source, Path) or ("\n" not in source and source.endswith((".yaml", ".yml")))
+        where = ""
         try:
-            text = read_text(source) if is_file else clean_text(str(source))
-        except ValueError as error:  # no text; names the file
-            raise TaskError(str(error)) from error
-        try:
-            data = yaml.safe_load(text)
-        except yaml.YAMLError as error:
-            raise TaskError(f"not valid YAML: {' '.join(str(error).split())}") from error
-        return cls.from_dict(data)
+            text, where = read_source(source, (".yaml", ".yml"))
+            return cls.from_dict(parse_yaml(text))
+        except ValueError as error:
+            raise TaskError(f"{where}{error}") from error
 
     def to_networkx(self) -> nx.DiGraph:
         """The precedence graph; an edge runs from each subtask to the subtasks that wait for it."""
@@ -383,13 +374,3 @@ def _names(what: str, value: object) -> tuple[str, ...]:
     if not all(isinstance(name, str) and name and is_whole(name) for name in names) or not (names or empty_is_meant):
         raise TaskError(f"{what} must hold non-empty names, got {shown(value)}")
     return tuple(names)
-
-
-def _check_keys(data: Mapping[str, Any], required: set[str], optional: set[str], where: str) -> None:
-    missing = sorted(required - data.keys())
-    unknown = sorted(str(key) for key in data.keys() - required - optional)
-    if missing or unknown:
-        raise TaskError(
-            f"{where} has missing keys {missing} and unknown keys {unknown}; "
-            f"required: {sorted(required)}, optional: {sorted(optional)}"
-        )

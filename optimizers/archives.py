@@ -12,6 +12,7 @@ from ribs.archives import GridArchive
 
 from legible_envs.key_space import KeySpace
 from legible_envs.support.files import open_npz, write_npz
+from legible_envs.support.stored_arrays import stored_array
 from legible_envs.support.validation import entries, integer, shown
 from legible_envs.workspace import Workspace
 from optimizers.errors import SearchError
@@ -175,7 +176,9 @@ def read_archive(path: Path) -> dict[str, npt.NDArray[Any]]:
 
     Raises:
         FileNotFoundError: There is no such file.
-        SearchError: The file is not such an archive, damaged, or too large.
+        OSError: It cannot be read.
+        SearchError: It is not such an archive: an array is missing, of another kind or shape than the others say, not
+            finite, or a cell is there twice.
     """
     refusal = f"{path} is not an archive written by a search, or it is damaged"
     try:
@@ -183,12 +186,19 @@ def read_archive(path: Path) -> dict[str, npt.NDArray[Any]]:
             missing = [name for name in FIELDS if name not in stored]
             if missing:
                 raise SearchError(f"{refusal}: it lacks the arrays {missing}, it has {sorted(stored)}")
-            arrays = {name: stored[name] for name in FIELDS}
-    except FileNotFoundError:
+            objective = stored_array(stored, "objective", "f", (None,), finite=True)
+            rows = len(objective)
+            index = stored_array(stored, "index", "iu", (rows,))
+            if rows and (index.min() < 0 or len(np.unique(index)) < rows):
+                raise ValueError("`index` must hold numbers of cells from 0 on, each once")
+            arrays = {
+                "solution": stored_array(stored, "solution", "iuf", (rows, None), finite=True),
+                "objective": objective,
+                "measures": stored_array(stored, "measures", "iuf", (rows, None), finite=True),
+                "index": index,
+            }
+    except SearchError:
         raise
-    except (ValueError, KeyError, OSError) as error:
+    except ValueError as error:
         raise SearchError(f"{refusal}: {error}") from error
-    lengths = {name: values.shape[0] if values.ndim else None for name, values in arrays.items()}
-    if len(set(lengths.values())) != 1:
-        raise SearchError(f"{refusal}: its arrays have different lengths {lengths}")
     return arrays

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import importlib.util
 import shutil
 import subprocess
@@ -89,6 +90,56 @@ def test_every_room_says_in_a_sentence_what_is_in_it():
         for package in row:
             for module, _ in page._rooms_in(package):
                 assert page.sentence(module).endswith((".", "?")), module
+
+
+READERS = {"json.load", "json.loads", "tomllib.load", "tomllib.loads", "yaml.load", "yaml.safe_load", "numpy.load"}
+"""Readers that trust what they read; files go through `plain_data` and `open_npz`."""
+
+TRUSTED = {
+    "legible_envs/support/plain_data.py": {"json.loads", "tomllib.loads"},  # the one place
+    "legible_envs/workspace_checks.py": {"json.loads"},  # what the line has just written
+    "legible_envs/datasets/overcooked_ai/states.py": {"json.loads"},  # a state per row, each value checked when used
+    "optimizers/search_run.py": {"json.loads"},  # what the line has just written
+    "optimizers/runs/checkpoint.py": {"json.loads"},  # a header of limited length, whose digest was compared
+    "legible_envs/support/digests.py": {"json.loads"},  # what the line has just written
+    "benchmarks/trials/store.py": {"json.loads"},  # what the line has just written
+    "benchmarks/experiments/optimizers/run.py": {"json.loads"},  # a key that this process made
+    "benchmarks/throughput/predictors_grid.py": {"json.loads"},  # answers of a process that this one started
+    "benchmarks/throughput/peer_maxent_irl.py": {"numpy.load"},  # a file that the process which started it wrote
+}
+
+
+def trusting_calls(source: str) -> set[str]:
+    """Calls of READERS in a program, by whatever name they were imported."""
+    tree, names = ast.parse(source), {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            names |= {alias.asname or alias.name: alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            names |= {alias.asname or alias.name: f"{node.module}.{alias.name}" for alias in node.names}
+    found = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Name | ast.Attribute):
+            first, dot, rest = ast.unparse(node).partition(".")
+            found.add(f"{names.get(first, first)}{dot}{rest}")
+    return found & READERS
+
+
+def test_files_are_read_in_one_place():
+    calls = {
+        path.relative_to(ROOT).as_posix(): found
+        for package in PACKAGES
+        for path in sorted((ROOT / package).rglob("*.py"))
+        if (found := trusting_calls(path.read_text(encoding="utf-8")))
+    }
+    assert calls == TRUSTED
+
+
+@pytest.mark.parametrize(
+    "source", ["from json import loads as f\nf(x)", "import numpy as np\nnp.load(x)", "json.load(x)"]
+)
+def test_a_trusting_reader_would_be_found(source):
+    assert len(trusting_calls(source)) == 1
 
 
 def test_every_folder_of_modules_is_a_package():

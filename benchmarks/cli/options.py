@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import math
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
-from datetime import date, datetime, time
 from typing import Any, TypeVar
 
 import click
 
 from benchmarks.cli.destinations import DestinationFolder
+from legible_envs.support.plain_data import parse_json, parse_toml
 
 __all__ = [
     "Assignment",
@@ -57,20 +55,14 @@ def typed_value(text: str) -> Any:
         [0.5, True, [7, 7], 'sum', '7', None]
     """
     try:
-        return json.loads(text)
-    except (ValueError, RecursionError):
+        return parse_json(text, finite=False)
+    except ValueError:
         pass
     try:
-        found = tomllib.loads(f"value = {text}")
-    except (ValueError, RecursionError):
+        found = parse_toml(f"value = {text}", finite=False)
+    except ValueError:
         return text
-    return text if found.keys() != {"value"} or _holds_dates(found) else found["value"]
-
-
-def _holds_dates(value: Any) -> bool:
-    if isinstance(value, dict):
-        return any(map(_holds_dates, value.values()))
-    return any(map(_holds_dates, value)) if isinstance(value, list) else isinstance(value, date | datetime | time)
+    return text if found.keys() != {"value"} else found["value"]
 
 
 def settings_from(assigned: Sequence[tuple[str, Any]], option: str) -> dict[str, Any]:

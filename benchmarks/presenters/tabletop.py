@@ -29,6 +29,7 @@ from benchmarks.presenters.tabletop_panels import CONDITIONS, LIST, beta_of, lis
 from legible_envs.errors import LayoutError
 from legible_envs.overcooked.layout_kind import is_kitchen
 from legible_envs.support.files import write_text
+from legible_envs.support.plain_data import parse_json
 from legible_envs.tabletop import TabletopLayout, TabletopTask
 from optimizers.runs.folder import is_run_folder
 
@@ -166,8 +167,8 @@ def is_table(text: str, source: str) -> bool:
     if text.lstrip().startswith(("{", "[")) and is_kitchen(text):
         return False
     try:
-        data = json.loads(text)
-    except (ValueError, RecursionError):
+        data = parse_json(text)
+    except ValueError:
         return source.endswith(".json")
     return isinstance(data, dict)
 

@@ -7,7 +7,7 @@ import hashlib
 import json
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -18,12 +18,12 @@ from legible_envs.support.digests import broken_seal, sealed
 from legible_envs.support.files import write_text
 from legible_envs.support.plain_data import parse_json
 from legible_envs.support.text import read_text
-from legible_envs.support.validation import shown
 
 if TYPE_CHECKING:
     import pandas as pd
     from rich.console import Console
 
+    from benchmarks.reports.prediction_file import EvaluationContent
     from legible_envs.drawing.charts import Chart
     from legible_envs.rollouts.trajectory import Cut, Trajectory
     from predictors.evaluation.cross_validation import Comparison, Evaluation, LearningCurve
@@ -59,8 +59,6 @@ _TABLES: Final = (
     "comparison_pairs",
 )
 _CONFUSION_AT: Final = 0.5
-_SCHEMA: Final = 2
-_UNSEALED: Final = 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -289,9 +287,11 @@ def _drawn(results: PredictionResults) -> dict[str, Chart]:
 
 def _about(results: PredictionResults) -> dict[str, Any]:
     """The content of the section of a report, as JSON."""
+    from benchmarks.reports.prediction_file import SCHEMA
+
     found = results.evaluation
     return {
-        "schema": _SCHEMA,
+        "schema": SCHEMA,
         "definition": found.definition,
         "walks": int(found.table["trajectory"].nunique()),
         "participants": int(found.table["participant"].nunique()),
@@ -323,6 +323,9 @@ def evaluation_section(folder: Path) -> str | None:
     """
     from jinja2 import TemplateError
 
+    from benchmarks.reports.prediction_file import EvaluationContent
+    from legible_envs.support.models import validated
+
     file = folder / _FILE
     try:
         text = read_text(file)
@@ -332,8 +335,9 @@ def evaluation_section(folder: Path) -> str | None:
         _warn_of(file, str(error))
         return None
     try:
-        about = parse_json(text)
-        _check(about, folder)
+        content = parse_json(text)
+        about = validated(EvaluationContent, content)
+        _check(about, content, folder)
         figures = [
             (name, _FIGURES[name], _as_image(folder / f"{name}.svg"))
             for name in _FIGURES
@@ -343,12 +347,12 @@ def evaluation_section(folder: Path) -> str | None:
         return template.render(
             about=about,
             figures=figures,
-            summary=table_of([("", about["summary"])], 3),
-            comparisons=[(each, table_of([("", _in_words(each["pairs"]))], 3)) for each in about["comparisons"]],
+            summary=table_of([("", about.summary)], 3),
+            comparisons=[(each, table_of([("", _in_words(each.pairs))], 3)) for each in about.comparisons],
         )
     except (OSError, ValueError) as error:
         _warn_of(file, str(error))
-    except (KeyError, TypeError, AttributeError, TemplateError):
+    except (KeyError, TypeError, TemplateError):  # rows of a comparison without what is said of each
         _warn_of(file, "it is no evaluation")
     return None
 
@@ -358,21 +362,20 @@ def _warn_of(file: Path, why: str) -> None:
     warnings.warn(said, stacklevel=3)
 
 
-def _check(about: Any, folder: Path) -> None:
-    """Refuse the content of an evaluation that is not what was written; that of earlier versions has no digests.
+def _check(about: EvaluationContent, content: Mapping[str, Any], folder: Path) -> None:
+    """Refuse an evaluation that is not what was written; those of earlier versions have no digests.
 
     Raises:
-        ValueError: It is not.
+        ValueError: It was changed, or a figure beside it was.
     """
-    schema = about.get("schema") if isinstance(about, dict) else None
-    if isinstance(schema, bool) or schema not in (_UNSEALED, _SCHEMA):
-        raise ValueError(f"it has schema {shown(schema)}, this version reads schema {_SCHEMA}")
-    if schema == _UNSEALED:
+    from benchmarks.reports.prediction_file import UNSEALED
+
+    if about.version == UNSEALED:
         return
-    if why := broken_seal(about):
+    if why := broken_seal(content):
         raise ValueError(why)
-    for name, digest in about["figures"].items():
-        if _digest_of_file(folder / f"{name}.svg") != digest:
+    for name in _FIGURES:
+        if name in about.figures and _digest_of_file(folder / f"{name}.svg") != about.figures[name]:
             raise ValueError(f"{name}.svg beside it was changed since it was written, or damaged")
 
 

@@ -4,30 +4,24 @@ from __future__ import annotations
 
 import itertools
 import math
-import tomllib
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import date, datetime, time
-from difflib import get_close_matches
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final, NamedTuple, get_args
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from legible_envs.support.names import check_file_name, file_name
+from benchmarks.sweeps.sweep_file import MOST, SweepContent
+from legible_envs.support.models import as_plain, validated
+from legible_envs.support.names import file_name
+from legible_envs.support.plain_data import check_plain, parse_toml
 from legible_envs.support.text import read_text
-from legible_envs.support.validation import choice, integer, shown
-from legible_envs.workspace import ObjectiveName, Workspace, make_workspace
+from legible_envs.workspace import Workspace, make_workspace
 from predictors.registry import make_predictor
 
 __all__ = ["Named", "Prediction", "Sweep", "SweepError", "Variant"]
-
-_KEYS: Final = ("name", "seeds", "evaluations", "objectives", "workspaces", "emitters", "predictors", "people")
-
-MOST: Final = 1_000_000
-"""Searches of a sweep."""
 
 
 class SweepError(ValueError):
@@ -95,11 +89,9 @@ class Sweep:
         """
         path = Path(path)
         try:
-            data = tomllib.loads(read_text(path))
-        except RecursionError as error:
-            raise SweepError(f"{path} is not TOML that can be read: it is nested too deeply") from error
+            data = parse_toml(read_text(path))
         except ValueError as error:
-            raise SweepError(f"{path} is not TOML: {error}") from error
+            raise SweepError(f"{path}: {error}") from error
         try:
             return cls.from_dict({"name": file_name(path.stem)} | data)
         except SweepError as error:
@@ -119,23 +111,21 @@ class Sweep:
             SweepError: Unknown keys, unknown names, settings that a workspace or an emitter refuses, predictors that
                 cannot predict the goals of the participants of a workspace.
         """
-        unknown = sorted(set(data) - set(_KEYS))
-        if unknown or not data.get("workspaces"):
-            raise SweepError(
-                f"a sweep needs `workspaces` and knows the keys {', '.join(_KEYS)}; "
-                + (f"unknown: {', '.join(map(_meant, unknown))}" if unknown else "`workspaces` is missing or empty")
-            )
-        for key, value in data.items():
-            _refuse_dates_and_infinities(key, value)
-        workspaces = _axis(data["workspaces"], "workspace", own=("predictors", "people"))
-        shared = {"predictors": data.get("predictors", []), "people": data.get("people", {})}
+        try:
+            plain = as_plain(data)
+            check_plain(plain)
+        except ValueError as error:
+            raise SweepError(f"the sweep: {error}") from error
+        content = validated(SweepContent, plain, "the sweep", error=SweepError)
+        shared = {"predictors": content.predictors, "people": plain.get("people", {})}
+        workspaces = _axis(plain["workspaces"], "workspace", own=("predictors", "people"))
         sweep = cls(
-            name=_name(data.get("name", "sweep")),
+            name=content.name,
             workspaces=workspaces,
-            emitters=_axis(data.get("emitters", ["improve"]), "emitter"),
-            objectives=tuple(_listed(data.get("objectives", ["legibility"]), str, "objectives")),
-            evaluations=tuple(_integers(data.get("evaluations", [100_000]), "evaluations", 1)),
-            seeds=_seeds(data.get("seeds", 1)),
+            emitters=_axis(plain.get("emitters", ["improve"]), "emitter"),
+            objectives=tuple(content.objectives),
+            evaluations=tuple(content.evaluations),
+            seeds=tuple(content.seeds),
             prediction={
                 named.label: _prediction(shared | dict(named.own), f" of workspace {named.label!r}")
                 for named in workspaces
@@ -173,13 +163,9 @@ class Sweep:
         from optimizers import make_archive, make_emitter
 
         for what, values in (("objectives", self.objectives), ("evaluations", self.evaluations), ("seeds", self.seeds)):
-            if not values:
-                raise SweepError(f"`{what}` is empty; nothing would be run")
             if len(set(values)) < len(values):
                 twice = next(value for value, count in Counter(values).items() if count > 1)
                 raise SweepError(f"`{what}` has {twice!r} more than once")
-        for name in self.objectives:
-            choice("objectives", name, get_args(ObjectiveName), error=SweepError)
         axes = (self.workspaces, self.objectives, self.emitters, self.evaluations, self.seeds)
         if (count := math.prod(map(len, axes))) > MOST:
             raise SweepError(f"that makes {count:,} searches; a sweep has at most {MOST:,}")
@@ -229,79 +215,28 @@ def _without(settings: Mapping[str, Any], key: str) -> dict[str, Any]:
 
 
 def _prediction(data: Mapping[str, Any], whose: str = "") -> Prediction:
-    people, predictors = data["people"], tuple(_listed(data["predictors"], str, "predictors"))
-    if not isinstance(people, Mapping):
-        raise SweepError(f"`people`{whose} must be a table, got {shown(people)}")
-    if "participants" in people:
-        integer(f"`participants` of `people`{whose}", people["participants"], 1, 100_000, error=SweepError)
+    predictors = tuple(_listed(data["predictors"]))
     if len(set(predictors)) < len(predictors):
         raise SweepError(f"`predictors`{whose} has one more than once: {', '.join(predictors)}")
-    return Prediction(predictors, dict(people))
+    return Prediction(predictors, dict(data["people"]))
 
 
-def _name(value: Any) -> str:
-    """The name of a sweep, which names its folder, too."""
-    return check_file_name("name", value, error=SweepError)
-
-
-def _seeds(value: Any) -> tuple[int, ...]:
-    """That many seeds from 0, or those of a list."""
-    if isinstance(value, list | tuple):
-        return tuple(_integers(value, "seeds", 0))
-    return tuple(range(integer("seeds", value, 1, MOST, also="a list", error=SweepError)))
-
-
-def _integers(values: Any, what: str, low: int) -> list[int]:
-    return [
-        integer(what, value, low, error=SweepError)
-        for value in (values if isinstance(values, list | tuple) else [values])
-    ]
-
-
-def _meant(key: str) -> str:
-    near = get_close_matches(key, _KEYS, 1)
-    return f"{key!r}" + (f" (did you mean `{near[0]}`?)" if near else "")
-
-
-def _refuse_dates_and_infinities(where: str, value: Any) -> None:
-    """Refuse what trials, which are JSON, cannot hold; says where it stands.
-
-    Raises:
-        SweepError: There is such a value.
-    """
-    if isinstance(value, Mapping):
-        for key, inner in value.items():
-            _refuse_dates_and_infinities(f"{where}.{key}", inner)
-    elif isinstance(value, list | tuple):
-        for number, inner in enumerate(value, 1):
-            _refuse_dates_and_infinities(f"{where}[{number}]", inner)
-    elif isinstance(value, float) and not math.isfinite(value):
-        raise SweepError(f"`{where}` must be finite, got {value}")
-    elif isinstance(value, date | datetime | time):
-        raise SweepError(f"`{where}` must be a text, number, truth value, list or table, got the date or time {value}")
-
-
-def _axis(entries: Any, key: str, own: Sequence[str] = ()) -> tuple[Named, ...]:
-    """Entries of an axis: names or mappings, labelled so that tables can tell them apart; ``own`` are no settings."""
+def _axis(given: Any, key: str, own: Sequence[str] = ()) -> tuple[Named, ...]:
+    """Checked entries of an axis, labelled so that tables can tell them apart; ``own`` are no settings."""
     found = []
-    if not isinstance(entries, str | Mapping | list | tuple):
-        raise SweepError(f"`{key}s` must be a name, a table or a list of these, got {shown(entries)}")
-    for number, entry in enumerate([entries] if isinstance(entries, str | Mapping) else entries, 1):
-        settings = {key: entry} if isinstance(entry, str) else dict(entry) if isinstance(entry, Mapping) else {}
-        if not isinstance(settings.get(key), str):
-            raise SweepError(
-                f"entry {number} of `{key}s` must be a name or a table with the key `{key}`, got {shown(entry)}"
-            )
+    for entry in _listed(given):
+        settings = {key: entry} if isinstance(entry, str) else dict(entry)
         label = settings.pop("label", None)
-        if label is not None and not (isinstance(label, str) and label.strip()):
-            raise SweepError(f"`label` of entry {number} of `{key}s` must be a text, got {shown(label)}")
         apart = {name: settings.pop(name) for name in own if name in settings}
         found.append(Named(label if label is not None else _label(settings, key), settings, apart))
     labels = [name.label for name in found]
-    repeated = sorted({label for label in labels if labels.count(label) > 1})
-    if repeated or not found:
-        raise SweepError(f"`{key}s` " + (f"has {repeated} more than once; add `label`" if found else "is empty"))
+    if repeated := [label for label, count in Counter(labels).items() if count > 1]:
+        raise SweepError(f"`{key}s` has {repeated[0]!r} more than once; add `label`")
     return tuple(found)
+
+
+def _listed(value: Any) -> list[Any]:
+    return value if isinstance(value, list) else [value]
 
 
 def _label(settings: Mapping[str, Any], key: str) -> str:
@@ -312,11 +247,3 @@ def _label(settings: Mapping[str, Any], key: str) -> str:
         if name != key
     )
     return " ".join((settings[key], *shown))
-
-
-def _listed(values: Any, kind: type, what: str) -> Sequence[Any]:
-    values = values if isinstance(values, list | tuple) else [values]
-    wrong = [value for value in values if type(value) is not kind]
-    if wrong:
-        raise SweepError(f"`{what}` must hold {'texts' if kind is str else 'integers'}, got {shown(wrong[0])}")
-    return values

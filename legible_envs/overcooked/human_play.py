@@ -22,7 +22,9 @@ from legible_envs.overcooked.layouts import read_kitchen
 from legible_envs.overcooked.reach import reach_of
 from legible_envs.overcooked.recipes import PAPER_SOUPS, Recipe, check_recipes
 from legible_envs.support.files import open_npz, write_npz
-from legible_envs.support.validation import real
+from legible_envs.support.plain_data import parse_json
+from legible_envs.support.stored_arrays import stored_array, stored_text
+from legible_envs.support.validation import real, shown
 
 if TYPE_CHECKING:
     from legible_envs.overcooked.kitchen_file import KitchenFile
@@ -97,26 +99,31 @@ def load_played(path: str | os.PathLike[str]) -> Played:
         OSError: No such file.
         ValueError: The file is something else.
     """
+    from legible_envs.overcooked.played_file import PlayedContent
+    from legible_envs.support.models import validated
+
     try:
-        with open_npz(path) as arrays:
-            about = json.loads(str(arrays["about"]))
-            if about["schema"] != _SCHEMA:
-                raise ValueError(f"schema {about['schema']!r}, expected {_SCHEMA}")
-            actions, episodes, rewards = (arrays[name] for name in ("actions", "episodes", "rewards"))
-            if actions.ndim != 1 or not actions.shape == episodes.shape == rewards.shape:
-                raise ValueError("actions, episodes and rewards differ in length")
-            return Played(
-                OvercookedLayout.from_ascii(about["layout"]),
-                check_recipes(about["recipes"]),
-                about["virtual_obstacles"],
-                about["seed"],
-                actions.astype(np.int8),
-                episodes.astype(np.int32),
-                rewards.astype(np.float64),
-            )
-    except OSError:
-        raise
-    except Exception as error:
+        with open_npz(path) as file:
+            about = validated(PlayedContent, parse_json(stored_text(file, "about")), "`about`")
+            if about.env != ENV_ID:
+                raise ValueError(f"it was played in {shown(about.env)}, expected {ENV_ID}")
+            actions = stored_array(file, "actions", "iu", (None,))
+            episodes = stored_array(file, "episodes", "iu", actions.shape)
+            rewards = stored_array(file, "rewards", "f", actions.shape, finite=True)
+        if len(actions) and not 0 <= actions.min() <= actions.max() <= INTERACT:
+            raise ValueError(f"`actions` must be numbers from 0 to {INTERACT}")
+        if len(actions) and (episodes[0] != 0 or (episodes[1:] < episodes[:-1]).any() or episodes[-1] >= len(actions)):
+            raise ValueError("`episodes` must count the games from 0")
+        return Played(
+            OvercookedLayout.from_ascii(about.layout),
+            check_recipes(about.recipes),
+            about.virtual_obstacles,
+            about.seed,
+            actions.astype(np.int8),
+            episodes.astype(np.int32),
+            rewards.astype(np.float64),
+        )
+    except ValueError as error:
         raise ValueError(f"{os.fspath(path)} is no recorded play: {error}") from error
 
 

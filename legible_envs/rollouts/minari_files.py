@@ -20,6 +20,9 @@ import numpy as np
 
 from legible_envs.rollouts.replaying import RecordedEpisode, Replayer, environment_of
 from legible_envs.rollouts.trajectory import Trajectory
+from legible_envs.support.plain_data import parse_json
+from legible_envs.support.text import read_text
+from legible_envs.support.validation import shown
 
 if TYPE_CHECKING:
     from legible_envs.rollouts.recording import RecordTrajectories
@@ -169,7 +172,9 @@ def _opened(dataset: Any) -> Any:
     if folder is None:
         raise FileNotFoundError(f"there is no Minari data set {os.fspath(dataset)!r} here, by id or as a folder")
     try:
-        about = json.loads((folder / "metadata.json").read_bytes())
+        about = parse_json(read_text(folder / "metadata.json"), finite=False)
+        if not isinstance(about, dict):
+            raise ValueError(f"its metadata must be a mapping, got {shown(about)}")
         if missing := [name for name in ("observation_space", "action_space") if name not in about]:
             # Minari would make the environment that the file names, whatever it is
             raise ValueError(f"its metadata lack {missing}")
@@ -197,8 +202,19 @@ def _episodes(dataset: Any) -> Iterator[RecordedEpisode]:
             observations=np.asarray(episode.observations),
             actions=np.asarray(episode.actions),
             rewards=np.asarray(episode.rewards, dtype=np.float64),
-            labels={} if labels is None else json.loads(labels),
+            labels={} if labels is None else _labels(labels, episode.id),
         )
+
+
+def _labels(text: object, episode: object) -> dict[str, Any]:
+    """The arguments of ``trajectories`` that :func:`to_minari` kept."""
+    try:
+        labels = parse_json(text) if isinstance(text, str) else text
+    except ValueError as error:
+        raise ValueError(f"episode {episode}: its labels cannot be read: {error}") from error
+    if not isinstance(labels, dict):
+        raise ValueError(f"episode {episode}: its labels must be a mapping, got {shown(labels)}")
+    return labels
 
 
 def _plain(options: Mapping[str, Any]) -> dict[str, Any]:

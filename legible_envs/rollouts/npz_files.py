@@ -19,9 +19,10 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -29,11 +30,17 @@ from legible_envs.layout_kinds import LayoutKind, kind_named, kind_of
 from legible_envs.rollouts.trajectory import Trajectory
 from legible_envs.support.file_kinds import describe_file
 from legible_envs.support.files import open_npz, write_npz
+from legible_envs.support.stored_arrays import says, stored_array, stored_json, stored_whole
+
+if TYPE_CHECKING:
+    from legible_envs.rollouts.records import TrajectoryRecord
 
 __all__ = ["SCHEMA", "is_npz_of_trajectories", "read_npz", "save_trajectories"]
 
 SCHEMA: Final = 3
 _KIND: Final = "legible-envs trajectories"
+_MOST_BYTES: Final = 2**29
+_MOST_CHARACTERS: Final = 32_000_000
 _TEXTS: Final = ("start", "goal", "candidates", "participant", "condition", "layout_name", "candidate_set", "complete")
 
 
@@ -44,7 +51,8 @@ def save_trajectories(path: str | os.PathLike[str], trajectories: Iterable[Traje
         The path written.
 
     Raises:
-        ValueError: Cells and positions, or different dimensions, in one file; a layout of no registered kind.
+        ValueError: Cells and positions, or different dimensions, in one file; a layout of no registered kind; more
+            than 512 MiB of arrays or 32 million characters of records.
         OSError: The file cannot be written; an earlier file is untouched.
     """
     trajectories = list(trajectories)
@@ -72,17 +80,17 @@ def save_trajectories(path: str | os.PathLike[str], trajectories: Iterable[Traje
         "trajectories": records,
     }
     states = [np.zeros((0, dimension), dtype=dtype), *(each.states for each in trajectories if each.num_states)]
-    write_npz(
-        path,
-        {
-            "kind": _KIND,
-            "schema": _least_schema(kinds, records),
-            "states": np.concatenate(states),
-            "times": np.concatenate([np.zeros(0), *(each.times for each in trajectories)]),
-            "offsets": np.cumsum([0, *(each.num_states for each in trajectories)], dtype=np.int64),
-            "records": np.frombuffer(json.dumps(content).encode("ascii"), dtype=np.uint8),
-        },
-    )
+    arrays: dict[str, Any] = {
+        "kind": _KIND,
+        "schema": _least_schema(kinds, records),
+        "states": np.concatenate(states),
+        "times": np.concatenate([np.zeros(0), *(each.times for each in trajectories)]),
+        "offsets": np.cumsum([0, *(each.num_states for each in trajectories)], dtype=np.int64),
+        "records": np.frombuffer(json.dumps(content).encode("ascii"), dtype=np.uint8),
+    }
+    if len(arrays["records"]) > _MOST_CHARACTERS or sum(np.asarray(a).nbytes for a in arrays.values()) > _MOST_BYTES:
+        raise ValueError(f"{len(trajectories):,} trajectories are too much for one file that is read; write several")
+    write_npz(path, arrays)
     return Path(path)
 
 
@@ -100,17 +108,15 @@ def read_npz(path: str | os.PathLike[str]) -> list[Trajectory]:
         ValueError: Not a file of trajectories, damaged, of a newer schema, or with layouts of a kind that is not known.
     """
     try:
-        with open_npz(path) as file:
+        with open_npz(path, most_bytes=_MOST_BYTES) as file:
             if not _is_ours(file):
                 raise ValueError(f"it looks like {describe_file(path)}")
-            schema = int(file["schema"])
+            schema = stored_whole(file, "schema", 1)
             if schema > SCHEMA:
                 raise ValueError(f"it has schema {schema}; this version reads up to {SCHEMA}")
-            arrays = {key: file[key] for key in ("states", "times", "offsets", "records")}
-        return _rebuild(**arrays)
-    except (KeyError, ValueError, TypeError, AttributeError, IndexError, RecursionError) as error:
-        missing = f"it has no {error}" if isinstance(error, KeyError) else error
-        raise ValueError(f"cannot read trajectories from {os.fspath(path)}: {missing}") from error
+            return _rebuild(file)
+    except ValueError as error:
+        raise ValueError(f"cannot read trajectories from {os.fspath(path)}: {error}") from error
 
 
 def is_npz_of_trajectories(path: str | os.PathLike[str]) -> bool:
@@ -123,19 +129,41 @@ def is_npz_of_trajectories(path: str | os.PathLike[str]) -> bool:
 
 
 def _is_ours(file: Mapping[str, Any]) -> bool:
-    return "kind" in file and str(file["kind"]) == _KIND
+    return says(file, "kind", _KIND)
 
 
-def _rebuild(states: Any, times: Any, offsets: Any, records: Any) -> list[Trajectory]:
-    content = json.loads(records.tobytes().decode("ascii"))
-    layouts = [kind_named(str(entry["kind"])).from_text(entry["text"]) for entry in content["layouts"]]
-    found = content["trajectories"]
-    if len(offsets) != len(found) + 1 or offsets[0] != 0 or offsets[-1] != len(states) or (np.diff(offsets) < 0).any():
-        raise ValueError("its offsets do not fit its states")
-    trajectories = []
-    for record, begin, end in zip(found, offsets, offsets[1:], strict=False):
-        number = record.pop("layout")
-        record["candidates"] = tuple(record["candidates"])
-        layout = None if number is None else layouts[number]
-        trajectories.append(Trajectory(states=states[begin:end], times=times[begin:end], layout=layout, **record))
-    return trajectories
+def _rebuild(file: Mapping[str, Any]) -> list[Trajectory]:
+    from legible_envs.rollouts.records import Records
+    from legible_envs.support.models import validated
+
+    content = validated(Records, stored_json(file, "records", most=_MOST_CHARACTERS), "`records`")
+    states = stored_array(file, "states", "iuf", (None, None))
+    times = stored_array(file, "times", "iuf", (len(states),), finite=True)
+    offsets = stored_array(file, "offsets", "iu", (len(content.trajectories) + 1,))
+    if offsets[0] != 0 or offsets[-1] != len(states) or (offsets[1:] < offsets[:-1]).any():
+        raise ValueError(f"`offsets` must rise from 0 to the number of states, {len(states)}")
+    layouts = [_layout(number, each.kind, each.text) for number, each in enumerate(content.layouts)]
+    return [
+        _trajectory(number, record, layouts, states[begin:end], times[begin:end])
+        for number, (record, (begin, end)) in enumerate(
+            zip(content.trajectories, pairwise(offsets.tolist()), strict=True)
+        )
+    ]
+
+
+def _layout(number: int, kind: str, text: str) -> Any:
+    try:
+        return kind_named(kind).from_text(text)
+    except ValueError as error:
+        raise ValueError(f"layout {number}: {error}") from error
+
+
+def _trajectory(number: int, record: TrajectoryRecord, layouts: Sequence[Any], states: Any, times: Any) -> Trajectory:
+    if record.layout is not None and record.layout >= len(layouts):
+        raise ValueError(f"trajectory {number} names layout {record.layout}; the file has {len(layouts)}, from 0 on")
+    about = {name: getattr(record, name) for name in _TEXTS}
+    layout = None if record.layout is None else layouts[record.layout]
+    try:
+        return Trajectory(states, times, layout=layout, goal_positions=record.goal_positions, **about)
+    except ValueError as error:
+        raise ValueError(f"trajectory {number}: {error}") from error

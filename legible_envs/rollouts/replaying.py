@@ -151,7 +151,10 @@ class Replayer:
                     f"{episode.name}, step {step} was recorded with reward {episode.rewards[step]:g} and gives "
                     f"{float(reward):g} now. {_CAUSES}"
                 )
-        found: list[Trajectory] = self._game.trajectories(**labels)
+        try:
+            found: list[Trajectory] = self._game.trajectories(**labels)
+        except TypeError as error:  # labels of a file may be those of another environment
+            raise ValueError(f"{episode.name} has labels that do not fit: {error}") from error
         return found
 
     def _begin(self, episode: RecordedEpisode) -> None:

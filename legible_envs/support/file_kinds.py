@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import zipfile
 from pathlib import Path
@@ -104,9 +103,11 @@ def _describe_text(head: bytes, is_whole: bool) -> str | None:
 def _describe_json(text: str, is_whole: bool) -> str | None:
     if not is_whole:
         return "JSON" if text[1:].lstrip()[:1] in ('"', "{", "[", "}", "]") else None
+    from legible_envs.support.plain_data import parse_json
+
     try:
-        value = json.loads(text)
-    except (ValueError, RecursionError):
+        value = parse_json(text, finite=False)
+    except ValueError:
         return None
     if isinstance(value, dict):
         return f"JSON, an object with the keys {_some(value)}" if value else "JSON, an empty object"

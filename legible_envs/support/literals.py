@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import json
 import warnings
 from dataclasses import dataclass
 from typing import Any, Final
@@ -49,12 +48,14 @@ def read_literal(text: str) -> Any:
         >>> read_literal("{'rows': ('XXX',), 'bonus': float('inf'),}  # mine")
         {'rows': ('XXX',), 'bonus': the expression float('inf') (line 1)}
     """
+    from legible_envs.support.plain_data import parse_json
+
     text = clean_text(text)
     if len(text) > _LONGEST:
         raise ValueError(f"it has {len(text):,} characters; expected at most {_LONGEST:,}")
     try:
-        return json.loads(text)
-    except (ValueError, RecursionError):
+        return parse_json(text, finite=False)
+    except ValueError:
         pass  # Python's literals say more, and their errors name the line as well
     try:
         with warnings.catch_warnings():  # about escapes such as "\d" in other people's strings

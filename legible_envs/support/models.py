@@ -20,14 +20,30 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from typing import Any, Final, TypeVar
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+import numpy as np
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from legible_envs.support.validation import Closed, MakeError, choice, flag, integer, real, shown
 
-__all__ = ["Choice", "FileModel", "Flag", "Length", "Real", "Text", "Whole", "as_path", "validated"]
+__all__ = [
+    "Checked",
+    "Choice",
+    "FileModel",
+    "Flag",
+    "Length",
+    "OneOrMore",
+    "Real",
+    "Text",
+    "Whole",
+    "YamlModel",
+    "as_path",
+    "as_plain",
+    "validated",
+]
 
 Model = TypeVar("Model", bound=BaseModel)
 
+_LEVELS: Final = 100
 _HERE: Final = "`\0`"  # stands for the path of a value until it is known
 
 
@@ -37,37 +53,69 @@ class FileModel(BaseModel):
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
 
 
+class YamlModel(FileModel):
+    """A mapping in which null means left out: YAML reads ``after:`` with nothing behind it as null."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_nulls(cls, data: Any) -> Any:
+        if not isinstance(data, dict):
+            return data
+        return {key: value for key, value in data.items() if value is not None}
+
+
+def Checked(check: Callable[[str, object], Any]) -> BeforeValidator:
+    """What a function of the house makes of a value; called with how messages name the value, and the value.
+
+    Its ValueErrors become those of :func:`validated`, with the path of the value in place of the name.
+    """
+    return BeforeValidator(lambda value: check(_HERE, value))
+
+
 def Whole(low: float = -math.inf, high: float = 2**63 - 1) -> BeforeValidator:
     """A whole number in a range."""
-    return BeforeValidator(lambda value: integer(_HERE, value, low, high))
+    return Checked(lambda name, value: integer(name, value, low, high))
 
 
 def Real(low: float = -math.inf, high: float = math.inf, closed: Closed = "both") -> BeforeValidator:
     """A finite number in a range."""
-    return BeforeValidator(lambda value: real(_HERE, value, low, high, closed=closed))
+    return Checked(lambda name, value: real(name, value, low, high, closed=closed))
 
 
 def Flag() -> BeforeValidator:
     """True or False."""
-    return BeforeValidator(lambda value: flag(_HERE, value))
+    return Checked(flag)
 
 
 def Choice(*options: object) -> BeforeValidator:
     """One of several values."""
-    return BeforeValidator(lambda value: choice(_HERE, value, options))
+    return Checked(lambda name, value: choice(name, value, options))
 
 
 def Text(most: int = 1000, *, empty: bool = False) -> BeforeValidator:
     """A text of limited length."""
 
-    def check(value: object) -> str:
+    def check(name: str, value: object) -> str:
         if not isinstance(value, str) or not (value or empty):
-            raise ValueError(f"{_HERE} must be a {'' if empty else 'non-empty '}text, got {shown(value)}")
+            raise ValueError(f"{name} must be a {'' if empty else 'non-empty '}text, got {shown(value)}")
         if len(value) > most:
-            raise ValueError(f"{_HERE} must be a text of at most {most:,} characters, got one of {len(value):,}")
+            raise ValueError(f"{name} must be a text of at most {most:,} characters, got one of {len(value):,}")
         return value
 
-    return BeforeValidator(check)
+    return Checked(check)
+
+
+def OneOrMore() -> BeforeValidator:
+    """A list, for which a single text may stand."""
+
+    def check(name: str, value: object) -> Any:
+        if isinstance(value, str):
+            return [value]
+        if not isinstance(value, list):
+            raise ValueError(f"{name} must be a text or a list of texts, got {shown(value)}")
+        return value
+
+    return Checked(check)
 
 
 def Length(least: int, most: int) -> Any:
@@ -91,10 +139,36 @@ def validated(model: type[Model], data: object, what: str = "", *, error: MakeEr
     try:
         return model.model_validate(data)
     except ValidationError as refusal:
-        found = refusal.errors(include_url=False)
+        found = _telling_first(refusal.errors(include_url=False))
         more = f" ({len(found) - 1} more {'is' if len(found) == 2 else 'are'} wrong)" if len(found) > 1 else ""
         said = _said(model, found[0], what)
-        raise error(f"{what}: {said}{more}" if what and "`" in said[:1] else f"{said}{more}") from None
+        is_placed = not what or said.startswith(what) or not said.startswith("`")
+        raise error(f"{said}{more}" if is_placed else f"{what}: {said}{more}") from None
+
+
+def as_plain(data: object) -> Any:
+    """Data of a program as a file would hold them: lists for tuples and arrays, dictionaries for other mappings.
+
+    Raises:
+        ValueError: They are nested more than 100 levels deep.
+
+    Example:
+        >>> as_plain({"size": (1, np.float64(0.5)), "at": np.zeros(2)})
+        {'size': [1, 0.5], 'at': [0.0, 0.0]}
+    """
+    return _as_plain(data, 0)
+
+
+def _as_plain(data: object, level: int) -> Any:
+    if level > _LEVELS:
+        raise ValueError(f"it is nested too deeply; at most {_LEVELS} levels are read")
+    if isinstance(data, np.ndarray | np.generic):
+        data = data.tolist()
+    if isinstance(data, Mapping):
+        return {key: _as_plain(value, level + 1) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [_as_plain(value, level + 1) for value in data]
+    return data
 
 
 def as_path(location: Iterable[str | int]) -> str:
@@ -106,6 +180,15 @@ def as_path(location: Iterable[str | int]) -> str:
     """
     text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location)
     return text.removeprefix(".")
+
+
+def _telling_first(problems: list[Any]) -> list[Any]:
+    """Problems with an unknown key before the missing one that it may have been meant as."""
+    first = problems[0]
+    if first["type"] == "missing":
+        beside = [p for p in problems if p["type"] == "extra_forbidden" and p["loc"][:-1] == first["loc"][:-1]]
+        return [*beside, *(p for p in problems if p not in beside)]
+    return problems
 
 
 def _said(model: type[BaseModel], problem: Mapping[str, Any], what: str) -> str:
@@ -160,7 +243,9 @@ def _keys_at(model: type[BaseModel], location: Sequence[str | int]) -> list[str]
                 return []
             here = here.model_fields[part].annotation
         here = _model_within(here)
-    return list(here.model_fields) if isinstance(here, type) and issubclass(here, BaseModel) else []
+    if not (isinstance(here, type) and issubclass(here, BaseModel)):
+        return []
+    return [field.alias or name for name, field in here.model_fields.items()]
 
 
 def _model_within(annotation: Any) -> Any:

@@ -12,6 +12,7 @@ import math
 import re
 import tomllib
 from collections.abc import Callable, Hashable
+from datetime import date, time
 from typing import Any, Final
 
 import yaml
@@ -23,6 +24,8 @@ __all__ = [
     "MOST_CHARACTERS_OF_TOML",
     "MOST_CHARACTERS_OF_YAML",
     "MOST_ENTRIES_OF_YAML",
+    "MOST_MARKS_OF_YAML",
+    "check_plain",
     "parse_json",
     "parse_toml",
     "parse_yaml",
@@ -37,23 +40,29 @@ MOST_CHARACTERS_OF_TOML: Final = 500_000
 MOST_CHARACTERS_OF_YAML: Final = 50_000
 """Longest YAML that is read; its reader takes up to 20 microseconds a character."""
 
+MOST_MARKS_OF_YAML: Final = 12_000
+"""Most brackets, commas, colons, dashes and other marks of YAML in a text; its reader takes 50 microseconds a mark."""
+
 MOST_ENTRIES_OF_YAML: Final = 100_000
 """Most values of a YAML file, those repeated by aliases counted as often as they are named."""
 
 _BITS: Final = 128  # seeds may be that long
 _LEVELS: Final = 100
-_LONG_KEY: Final = re.compile(r"(?:[\w\"'-]++[ \t]*+\.[ \t]*+){100}")
+_MARKS: Final = re.compile(r"[\[\]{},:?&*!-]")
+_BRACKETS: Final = re.compile(r"[\[\]{}]")
+_LONG_KEY: Final = re.compile(r"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){100}")
 
 
-def parse_json(text: str, *, finite: bool = True) -> Any:
+def parse_json(text: str, *, finite: bool = True, most: int = MOST_CHARACTERS) -> Any:
     """Read JSON.
 
     Args:
         text: The whole text.
         finite: Whether NaN and infinities, which Python writes as ``NaN`` and ``Infinity``, are refused.
+        most: How many characters it may have.
 
     Raises:
-        ValueError: It is not JSON; longer than :data:`MOST_CHARACTERS`; nested more than 100 levels deep; a key stands
+        ValueError: It is not JSON; longer than ``most``; nested more than 100 levels deep; a key stands
             twice in one mapping, or a number is not finite or longer than 128 bits. Says where.
 
     Example:
@@ -63,12 +72,16 @@ def parse_json(text: str, *, finite: bool = True) -> Any:
         Traceback (most recent call last):
         ValueError: `size[1]` must be a finite number, got inf
     """
-    _check_length(text, MOST_CHARACTERS, "JSON")
+    _check_length(text, most, "JSON")
     return _checked("JSON", lambda: json.loads(text, object_pairs_hook=_without_repeats), finite=finite)
 
 
-def parse_toml(text: str) -> dict[str, Any]:
+def parse_toml(text: str, *, finite: bool = True) -> dict[str, Any]:
     """Read TOML.
+
+    Args:
+        text: The whole text.
+        finite: Whether NaN and infinities are refused.
 
     Raises:
         ValueError: It is not TOML; longer than :data:`MOST_CHARACTERS_OF_TOML`; nested more than 100 levels deep; or it
@@ -77,7 +90,7 @@ def parse_toml(text: str) -> dict[str, Any]:
     _check_length(text, MOST_CHARACTERS_OF_TOML, "TOML")
     if _LONG_KEY.search(text):  # its reader takes seconds for a key of thousands of parts
         raise _too_deep()
-    data: dict[str, Any] = _checked("TOML", lambda: tomllib.loads(text))
+    data: dict[str, Any] = _checked("TOML", lambda: tomllib.loads(text), finite=finite)
     return data
 
 
@@ -85,12 +98,26 @@ def parse_yaml(text: str) -> Any:
     """Read YAML 1.1 of plain data, aliases included.
 
     Raises:
-        ValueError: It is not YAML, or more than plain data; longer than :data:`MOST_CHARACTERS_OF_YAML`; its values,
-            aliases unfolded, are more than :data:`MOST_ENTRIES_OF_YAML` or nested more than 100 levels deep; a key
-            stands twice, or a number is not finite or longer than 128 bits. Says where.
+        ValueError: It is not YAML, or more than plain data; longer than :data:`MOST_CHARACTERS_OF_YAML`, with more
+            marks than :data:`MOST_MARKS_OF_YAML`; its values, aliases unfolded, are more than
+            :data:`MOST_ENTRIES_OF_YAML` or nested more than 100 levels deep; a key stands twice, or a number is not
+            finite or longer than 128 bits. Says where.
     """
     _check_length(text, MOST_CHARACTERS_OF_YAML, "YAML")
+    if (marks := len(_MARKS.findall(text))) > MOST_MARKS_OF_YAML:
+        raise ValueError(f"it has {marks:,} brackets, commas, colons and such; at most {MOST_MARKS_OF_YAML:,} are read")
+    if _open_brackets(text) > 2 * _LEVELS:  # its reader takes time as the square of these
+        raise _too_deep()
     return _checked("YAML", lambda: _load_yaml(text))
+
+
+def _open_brackets(text: str) -> int:
+    """The most brackets that stand open at a time, those in quotes taken for brackets, too."""
+    depth = most = 0
+    for bracket in _BRACKETS.findall(text):
+        depth = depth + 1 if bracket in "[{" else max(depth - 1, 0)
+        most = max(most, depth)
+    return most
 
 
 def _check_length(text: str, most: int, kind: str) -> None:
@@ -107,7 +134,7 @@ def _checked(kind: str, parse: Callable[[], Any], *, finite: bool = True) -> Any
         raise ValueError(f"not valid {kind}: {' '.join(str(error).split())}") from error
     except RecursionError as error:
         raise _too_deep() from error
-    _check_values(data, finite=finite)
+    check_plain(data, finite=finite)
     return data
 
 
@@ -119,8 +146,12 @@ def _too_deep() -> ValueError:
     return _RefusedError(f"it is nested too deeply; at most {_LEVELS} levels are read")
 
 
-def _check_values(data: Any, *, finite: bool) -> None:
-    """Refuse values that are no plain data, wherever they stand.
+def check_plain(data: Any, *, finite: bool = True) -> None:
+    """Refuse values that are no plain data, wherever they stand in lists and dictionaries.
+
+    Args:
+        data: Any data; that of a program goes through :func:`~legible_envs.support.models.as_plain` first.
+        finite: Whether NaN and infinities are refused.
 
     Raises:
         ValueError: There is one; names it by keys and positions from 0.
@@ -139,7 +170,11 @@ def _check_values(data: Any, *, finite: bool) -> None:
             if isinstance(value, dict | list):
                 waiting.append((value, (*path, key)))
             elif (wanted := _wanted_instead(value, finite)) is not None:
-                raise ValueError(f"{_where((*path, key)[1:])} must be {wanted}, got {shown(value)}")
+                raise ValueError(f"{_where((*path, key)[1:])} must be {wanted}, got {_shown(value)}")
+
+
+def _shown(value: Any) -> str:
+    return f"the date or time {value}" if isinstance(value, date | time) else shown(value)
 
 
 def _wanted_instead(value: Any, finite: bool) -> str | None:

@@ -94,6 +94,14 @@ class Registry:
             found[name] = Plugin(name, "registered", target_of(factory), factory)
         return found
 
+    def built_in(self) -> tuple[str, ...]:
+        """Names of those that are built in; installed packages are not searched for them."""
+        return tuple(self._built_in)
+
+    def __contains__(self, name: object) -> bool:
+        """Whether there is a plug-in of this name; installed packages are searched where nothing else has it."""
+        return name in self._registered or name in self._built_in or name in self._installed()
+
     def resolve(self, spec: Any) -> Any:
         """Find a plug-in by name or ``"module:Name"``, or return the plug-in given."""
         if not isinstance(spec, str):

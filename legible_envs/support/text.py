@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 from typing import Any, Final
 
-__all__ = ["clean_text", "decode_text", "dump_yaml", "read_text"]
+__all__ = ["clean_text", "decode_text", "dump_yaml", "read_source", "read_text"]
 
 # The longer marks first: UTF-32's begins with UTF-16's.
 _MARKS: Final = (
@@ -30,6 +30,25 @@ def read_text(path: str | os.PathLike[str]) -> str:
         ValueError: It is not text; says what it looks like.
     """
     return decode_text(Path(path).read_bytes(), os.fspath(path))
+
+
+def read_source(source: str | Path, suffixes: tuple[str, ...]) -> tuple[str, str]:
+    """The text of a file, or a text itself.
+
+    Args:
+        source: A ``Path``, or a string: that of a file where it is one line with one of the suffixes, else the text.
+        suffixes: Such as ``(".json",)``.
+
+    Returns:
+        The text, and how messages about it begin: the path and a colon, nothing for a text itself.
+
+    Raises:
+        OSError: The file cannot be read.
+        ValueError: It is not text; names the file.
+    """
+    if isinstance(source, Path) or ("\n" not in source and source.endswith(suffixes)):
+        return read_text(source), f"{source}: "
+    return clean_text(str(source)), ""
 
 
 def decode_text(data: bytes, source: str = "the text", *, unify: bool = True) -> str:

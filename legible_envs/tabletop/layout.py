@@ -16,28 +16,27 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.errors import LayoutError
-from legible_envs.support.text import clean_text, read_text
+from legible_envs.support.text import read_source
 from legible_envs.support.validation import integer
 from legible_envs.tabletop.objects import (
+    MOST_OBJECTS,
+    MOST_OBSTACLES,
     OBSTACLE_SIZE,
     Table,
     TableObject,
     VirtualObstacle,
-    is_sequence,
-    plain_fields,
     rectangles_overlap,
 )
 
 if TYPE_CHECKING:
     from legible_envs.tabletop.geometry.paths import ShortestPaths
+    from legible_envs.tabletop.layout_files import LayoutContent, TaskFileContent
 
 __all__ = ["TabletopLayout"]
 
 SCHEMA: Final = 1
 MAX_OBSTACLES: Final = 4
 """Places for obstacles in a genome, unless another number is asked for."""
-MOST_OBJECTS: Final = 128
-MOST_OBSTACLES: Final = 64
 _EDGE: Final = 1e-9
 
 
@@ -280,22 +279,25 @@ class TabletopLayout:
         Raises:
             LayoutError: Another schema, missing or unknown keys, or values that the constructors reject.
         """
-        if not isinstance(data, Mapping):
-            raise LayoutError(f"a layout must be a mapping, got {type(data).__name__}", rule="schema")
-        if data.get("schema") != SCHEMA:
-            raise LayoutError(f"expected a layout with `schema` {SCHEMA}, got {data.get('schema')!r}", rule="schema")
-        unknown = sorted(str(key) for key in data.keys() - {"schema", "table", "objects", "obstacles"})
-        if unknown or not is_sequence(data.get("objects")) or not is_sequence(data.get("obstacles", ())):
-            raise LayoutError(
-                "a layout has the keys `schema`, `objects` (a list), and optionally `obstacles` (a list) and `table`; "
-                f"got {sorted(str(key) for key in data)}",
-                rule="schema",
-            )
-        objects, obstacles = (
-            [_build(kind, entry, f"{what} {number}") for number, entry in enumerate(data.get(key, ()), 1)]
-            for key, kind, what in (("objects", TableObject, "object"), ("obstacles", VirtualObstacle, "obstacle"))
-        )
-        return cls(objects, obstacles, _build(Table, data.get("table", {}), "the table"))
+        from legible_envs.support.models import as_plain, validated
+        from legible_envs.tabletop.layout_files import LayoutContent
+
+        try:
+            content = validated(LayoutContent, as_plain(data), "the layout")
+        except ValueError as error:
+            raise LayoutError(str(error), rule="schema") from error
+        return cls.from_content(content)
+
+    @classmethod
+    def from_content(cls, content: LayoutContent | TaskFileContent) -> TabletopLayout:
+        """The layout of a file that was checked.
+
+        Raises:
+            LayoutError: Values that the constructors reject.
+        """
+        objects = [TableObject(**entry.model_dump()) for entry in content.objects]
+        obstacles = [VirtualObstacle(**entry.model_dump()) for entry in content.obstacles]
+        return cls(objects, obstacles, Table(**content.table.model_dump(exclude_none=True)))
 
     def to_json(self, path: str | Path | None = None) -> str:
         """Return the layout as JSON text, and write it to ``path`` if given."""
@@ -312,18 +314,16 @@ class TabletopLayout:
             LayoutError: Not JSON, or not a layout.
             FileNotFoundError: The file does not exist.
         """
-        is_file = isinstance(source, Path) or ("\n" not in source and source.endswith(".json"))
+        from legible_envs.support.plain_data import parse_json
+
+        where = ""
         try:
-            text = read_text(source) if is_file else clean_text(str(source))
-        except ValueError as error:  # no text; names the file
-            raise LayoutError(str(error), rule="schema") from error
-        try:
-            data = json.loads(text)
-        except json.JSONDecodeError as error:
-            raise LayoutError(f"not valid JSON: {error}", rule="schema") from error
-        except (ValueError, RecursionError) as error:
-            raise LayoutError(f"not the JSON of a table: {error}", rule="schema") from error
-        return cls.from_dict(data)
+            text, where = read_source(source, (".json",))
+            return cls.from_dict(parse_json(text))
+        except LayoutError as error:
+            raise LayoutError(f"{where}{error}", rule=error.rule) from error
+        except ValueError as error:
+            raise LayoutError(f"{where}{error}", rule="schema") from error
 
     # -- genomes -------------------------------------------------------------------------------------------------------
 
@@ -415,11 +415,3 @@ def _at_most(most: int, what: str, parts: Iterable[Any]) -> tuple[Any, ...]:
     if len(found) > most:
         raise LayoutError(f"a layout has at most {most} {what}, got more", rule=what)
     return found
-
-
-def _build(kind: type, data: Any, what: str) -> Any:
-    values = plain_fields(data, kind, what)
-    try:
-        return kind(**values)
-    except TypeError as error:
-        raise LayoutError(f"{what}: {error}", rule="schema") from error

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, Final
 
@@ -15,10 +15,28 @@ from legible_envs.errors import LayoutError
 from legible_envs.support.names import is_whole
 from legible_envs.support.validation import entries, flag, is_real, real, shown
 
-__all__ = ["CUBE", "OBSTACLE_SIZE", "Table", "TableObject", "VirtualObstacle", "rectangle", "rectangles_overlap"]
+__all__ = [
+    "CUBE",
+    "FARTHEST",
+    "LONGEST",
+    "MAX_STARTS",
+    "MOST_OBJECTS",
+    "MOST_OBSTACLES",
+    "OBSTACLE_SIZE",
+    "Table",
+    "TableObject",
+    "VirtualObstacle",
+    "rectangle",
+    "rectangles_overlap",
+]
 
 CUBE: Final = 0.045
 OBSTACLE_SIZE: Final = (0.30, 0.01)
+
+MOST_OBJECTS: Final = 128
+"""Objects of a table."""
+MOST_OBSTACLES: Final = 64
+"""Virtual obstacles of a table; shortest paths around them take time as their cube."""
 _TOUCH: Final = 1e-9
 LONGEST: Final = 100.0
 """Metres: of a side of the table, an object or an obstacle."""
@@ -59,17 +77,6 @@ def lengths(value: Any, what: str, least: float = 0.0) -> Point:
         between = f"from {least:g} to {LONGEST:g} m" if least else f"at most {LONGEST:g} m"
         raise LayoutError(f"{what} must be {between}, got {shown(value)}", rule="number")
     return long, wide
-
-
-def plain_fields(data: Any, kind: type, what: str) -> dict[str, Any]:
-    """The mapping ``data`` as keyword arguments of the dataclass ``kind``, or a LayoutError naming wrong keys."""
-    if not isinstance(data, Mapping):
-        raise LayoutError(f"{what} must be a mapping, got {type(data).__name__}", rule="schema")
-    known = [f.name for f in fields(kind)]
-    unknown = sorted(str(key) for key in data if key not in known)
-    if unknown:
-        raise LayoutError(f"{what} has unknown keys {unknown}; known: {known}", rule="schema")
-    return dict(data)
 
 
 def rectangle(x: float, y: float, angle: float, length: float, width: float) -> npt.NDArray[np.float64]:
@@ -217,8 +224,3 @@ class Table:
             "starts": {name: list(at) for name, at in self.starts.items()},
             "hand": self.hand,
         }
-
-
-def is_sequence(value: Any) -> bool:
-    """Whether a value is a list-like of entries, not a text."""
-    return isinstance(value, Sequence) and not isinstance(value, (str, bytes))

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from legible_envs.errors import LayoutError, TaskError
 from legible_envs.support.names import is_whole
-from legible_envs.support.text import clean_text, dump_yaml, read_text
+from legible_envs.support.text import dump_yaml, read_source
 from legible_envs.support.validation import shown
 from legible_envs.tabletop.layout import TabletopLayout
 from legible_envs.tabletop.objects import Point, point, rectangle, rectangles_overlap
@@ -146,21 +146,16 @@ class TabletopTask:
             TaskError: A missing or unknown key, or data that this class or the graph rejects.
             LayoutError: Data that the layout rejects.
         """
-        keys = {"schema", "name", "table", "objects", "obstacles", "configuration", "task"}
-        if not isinstance(data, Mapping):
-            raise TaskError(f"a task must be a mapping with the keys {sorted(keys)}, got {type(data).__name__}")
-        unknown = sorted(str(key) for key in data if key not in keys)
-        missing = sorted({"name", "objects", "task"} - data.keys())
-        if unknown or missing:
-            raise TaskError(
-                f"the task has missing keys {missing} and unknown keys {unknown}; required: name, objects, task, "
-                "optional: schema, table, obstacles, configuration"
-            )
-        if data.get("schema", _SCHEMA) != _SCHEMA:
-            raise TaskError(f"expected a task with `schema` {_SCHEMA}, got {data['schema']!r}")
-        arrangement = {"schema": 1, "objects": data["objects"], "obstacles": data.get("obstacles") or []}
-        layout = TabletopLayout.from_dict({**arrangement, "table": data.get("table") or {}})
-        return cls(data["name"], layout, TaskGraph.from_dict(data["task"]), data.get("configuration") or {})
+        from legible_envs.support.models import as_plain, validated
+        from legible_envs.tabletop.layout_files import TaskFileContent
+
+        try:
+            content = validated(TaskFileContent, as_plain(data), "the task")
+        except ValueError as error:
+            raise TaskError(str(error)) from error
+        graph = TaskGraph.from_dict(content.task)
+        places = {name: (x, y) for name, (x, y) in content.configuration.items()}
+        return cls(content.name, TabletopLayout.from_content(content), graph, places)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data that :meth:`from_dict` reads back to an equal task."""
@@ -184,18 +179,16 @@ class TabletopTask:
             LayoutError: Not a valid arrangement.
             FileNotFoundError: The file does not exist.
         """
-        import yaml
+        from legible_envs.support.plain_data import parse_yaml
 
-        is_file = isinstance(source, Path) or ("\n" not in source and source.endswith((".yaml", ".yml")))
+        where = ""
         try:
-            text = read_text(source) if is_file else clean_text(str(source))
-        except ValueError as error:  # no text; names the file
-            raise TaskError(str(error)) from error
-        try:
-            data = yaml.safe_load(text)
-        except yaml.YAMLError as error:
-            raise TaskError(f"not valid YAML: {error}") from error
-        return cls.from_dict(data)
+            text, where = read_source(source, (".yaml", ".yml"))
+            return cls.from_dict(parse_yaml(text))
+        except LayoutError as error:
+            raise LayoutError(f"{where}{error}", rule=error.rule) from error
+        except ValueError as error:
+            raise TaskError(f"{where}{error}") from error
 
     def to_yaml(self, path: str | Path | None = None) -> str:
         """Return the task as YAML text, and write it to ``path`` if given."""

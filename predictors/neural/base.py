@@ -5,9 +5,8 @@ from __future__ import annotations
 import inspect
 import json
 import os
-import zipfile
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Final, Self
 
@@ -15,7 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import Cut, Trajectory
-from legible_envs.support.files import write_npz
+from legible_envs.support.files import open_npz, write_npz
+from legible_envs.support.stored_arrays import says, stored_array, stored_json, stored_whole
 from legible_envs.support.validation import integer, real
 from predictors.base import (
     FRACTIONS,
@@ -38,6 +38,7 @@ SCHEMA: Final = 1
 """Version of the files that :meth:`NeuralPredictor.save` writes."""
 
 _KIND: Final = "legible-envs neural predictor"
+_WEIGHTS: Final = "weights/"
 _AT_ONCE: Final = 512
 _MOST: Final = {
     "num_layers": 64,
@@ -195,7 +196,7 @@ class NeuralPredictor(GoalPredictor):
             "classes": self.classes_.tolist(),
             "encoding": self.encoding_.to_config(),
         }
-        arrays: dict[str, Any] = {f"weights/{name}": value for name, value in self.weights_.items()}
+        arrays: dict[str, Any] = {f"{_WEIGHTS}{name}": value for name, value in self.weights_.items()}
         arrays |= {"prior": self.prior_, "validation_loss": self.validation_loss_}
         text = np.frombuffer(json.dumps(config).encode("ascii"), dtype=np.uint8)
         write_npz(path, {"kind": _KIND, "schema": SCHEMA, "config": text, **arrays})
@@ -207,45 +208,57 @@ class NeuralPredictor(GoalPredictor):
 
         Raises:
             FileNotFoundError: No such file.
+            OSError: It cannot be read.
             ValueError: Not a file of a predictor of this class, damaged, or of a newer schema.
         """
-        name = os.fspath(path)
         try:
-            # Opened here, so that it is closed where it turns out to be no archive.
-            with open(path, "rb") as source, np.load(source, allow_pickle=False) as file:
-                if not isinstance(file, np.lib.npyio.NpzFile) or "kind" not in file or str(file["kind"]) != _KIND:
+            with open_npz(path) as file:
+                if not says(file, "kind", _KIND):
                     raise ValueError("it is not a file of a neural predictor")
-                if int(file["schema"]) > SCHEMA:
-                    raise ValueError(f"it has schema {int(file['schema'])}; this version reads up to {SCHEMA}")
-                arrays = {key: file[key] for key in file.files if key not in ("kind", "schema")}
-            return cls._rebuild(arrays)
-        except FileNotFoundError:
-            raise
-        except (OSError, EOFError, KeyError, ValueError, TypeError, AttributeError, zipfile.BadZipFile) as error:
-            raise ValueError(f"cannot read a {cls.__name__} from {name}: {error}") from error
+                schema = stored_whole(file, "schema", 1)
+                if schema > SCHEMA:
+                    raise ValueError(f"it has schema {schema}; this version reads up to {SCHEMA}")
+                return cls._rebuild(file)
+        except ValueError as error:
+            raise ValueError(f"cannot read a {cls.__name__} from {os.fspath(path)}: {error}") from error
 
     @classmethod
-    def _rebuild(cls, arrays: dict[str, npt.NDArray[Any]]) -> Self:
-        config = json.loads(arrays.pop("config").tobytes().decode("ascii"))
-        if config["predictor"] != cls._name:
-            raise ValueError(f"it holds a {config['predictor']!r} predictor, not {cls._name!r}")
-        predictor = cls(**config["parameters"])
+    def _rebuild(cls, file: Mapping[str, Any]) -> Self:
+        from legible_envs.support.models import validated
+        from predictors.neural.checkpoints import CheckpointConfig
+
+        config = validated(CheckpointConfig, stored_json(file, "config"), "`config`")
+        if config.predictor != cls._name:
+            raise ValueError(f"it holds a {config.predictor!r} predictor, not {cls._name!r}")
+        if unknown := sorted(config.parameters.keys() - inspect.signature(cls).parameters.keys()):
+            raise ValueError(f"`config`: unknown parameters {unknown}")
+        if len(set(config.classes)) < len(config.classes):
+            raise ValueError("`config`: `classes` has one more than once")
+        predictor = cls(**config.parameters)
         predictor._settings()
-        predictor.classes_ = np.array(config["classes"])
-        predictor.encoding_ = Encoding.from_config(config["encoding"])
-        predictor.prior_ = arrays.pop("prior")
-        predictor.validation_loss_ = arrays.pop("validation_loss")
-        weights = {key.removeprefix("weights/"): value for key, value in arrays.items()}
-        expected = predictor._network().initial_weights(
-            predictor.members, predictor.encoding_.width, len(predictor.classes_), np.random.default_rng(0)
-        )
-        shapes = {key: value.shape for key, value in weights.items()}
-        if shapes != {key: value.shape for key, value in expected.items()}:
-            raise ValueError("its weights do not fit its parameters")
-        if not all(np.isfinite(value).all() for value in weights.values()):
-            raise ValueError("its weights are not finite")
-        predictor.weights_ = weights
+        predictor.classes_ = np.array(config.classes)
+        predictor.encoding_ = Encoding.from_config(config.encoding)
+        predictor.prior_ = stored_array(file, "prior", "f", (len(config.classes),), finite=True)
+        if not (predictor.prior_ > 0).all():
+            raise ValueError("`prior` must be positive")
+        predictor.validation_loss_ = stored_array(file, "validation_loss", "f", (None, predictor.members))
+        predictor.weights_ = predictor._stored_weights(file)
         return predictor
+
+    def _stored_weights(self, file: Mapping[str, Any]) -> Weights:
+        """The weights of a file, one after the other: the parameters may promise more than any memory holds."""
+        expected = self._network().shapes(self.members, self.encoding_.width, len(self.classes_))
+        weights: Weights = {}
+        for name, shape in expected:
+            array = file.get(f"{_WEIGHTS}{name}")
+            if array is None or array.shape != shape or array.dtype.kind != "f":
+                raise ValueError(f"its weights do not fit its parameters: `{name}` must be floats of shape {shape}")
+            if not np.isfinite(array).all():
+                raise ValueError(f"its weights are not finite: `{name}`")
+            weights[name] = array
+        if more := sorted(name for name in file if name.removeprefix(_WEIGHTS) not in weights and _WEIGHTS in name):
+            raise ValueError(f"its weights do not fit its parameters: it also has {more[:5]}")
+        return weights
 
     # -- inside -------------------------------------------------------------------------------------------------------
 

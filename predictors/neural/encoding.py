@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Final, Self
+from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from legible_envs.rollouts.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from predictors.neural.checkpoints import EncodingConfig
 
 __all__ = ["Encoding"]
 
@@ -136,10 +139,26 @@ class Encoding:
         return asdict(self)
 
     @classmethod
-    def from_config(cls, config: Mapping[str, Any]) -> Self:
-        """The encoding that :meth:`to_config` described."""
-        values: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in config.items()}
-        return cls(**values)
+    def from_config(cls, config: EncodingConfig) -> Self:
+        """The encoding that :meth:`to_config` described.
+
+        Raises:
+            ValueError: The parts contradict each other.
+        """
+        if config.grid != bool(config.shape) or (config.grid and config.dimension != 2):
+            raise ValueError(
+                f"an encoding of {'cells' if config.grid else 'positions'} cannot have {config.dimension} dimensions "
+                f"and a grid of shape {config.shape}"
+            )
+        return cls(
+            grid=config.grid,
+            dimension=config.dimension,
+            shape=tuple(config.shape),
+            scale=config.scale,
+            stride=config.stride,
+            starts=tuple(config.starts),
+            layouts=tuple(config.layouts),
+        )
 
 
 def _check_cells(cells: npt.NDArray[np.int64]) -> None:

@@ -9,7 +9,7 @@ computation as feeding them all at once.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, Final, NamedTuple, Protocol
 
 import numpy as np
@@ -73,6 +73,10 @@ class Network(Protocol):
         """Random weights of ``members`` networks."""
         ...
 
+    def shapes(self, members: int, inputs: int, outputs: int) -> Iterator[tuple[str, tuple[int, ...]]]:
+        """Name and shape of each of these weights, without making them."""
+        ...
+
     def __call__(self, ops: Operations, weights: Mapping[str, Any], x: Any, state: Any = None) -> tuple[Any, Any]:
         """Logits after each row of ``x``, and the state to go on from."""
         ...
@@ -113,6 +117,16 @@ class Gru:
         weights["out"] = _uniform(rng, members, self.hidden, outputs, bound)
         weights["out_bias"] = np.zeros((members, outputs))
         return weights
+
+    def shapes(self, members: int, inputs: int, outputs: int) -> Iterator[tuple[str, tuple[int, ...]]]:
+        """See :class:`Network`."""
+        for layer in range(self.layers):
+            yield f"input{layer}", (members, inputs if layer == 0 else self.hidden, 3 * self.hidden)
+            yield f"input_bias{layer}", (members, 3 * self.hidden)
+            yield f"hidden{layer}", (members, self.hidden, 3 * self.hidden)
+            yield f"hidden_bias{layer}", (members, 3 * self.hidden)
+        yield "out", (members, self.hidden, outputs)
+        yield "out_bias", (members, outputs)
 
     def __call__(self, ops: Operations, weights: Mapping[str, Any], x: Any, state: Any = None) -> tuple[Any, Any]:
         """See :class:`Network`; the state is the hidden vectors ``(M, n, H)`` of each layer."""
@@ -179,6 +193,20 @@ class Transformer:
         linear("out", size, outputs)
         return weights
 
+    def shapes(self, members: int, inputs: int, outputs: int) -> Iterator[tuple[str, tuple[int, ...]]]:
+        """See :class:`Network`."""
+        size = self.width
+        yield from _linear_shapes("embed", members, inputs, size)
+        for layer in range(self.layers):
+            yield from _norm_shapes(f"norm_attention{layer}", members, size)
+            yield from _linear_shapes(f"attend{layer}", members, size, 3 * size)
+            yield from _linear_shapes(f"project{layer}", members, size, size)
+            yield from _norm_shapes(f"norm_perceptron{layer}", members, size)
+            yield from _linear_shapes(f"widen{layer}", members, size, 4 * size)
+            yield from _linear_shapes(f"narrow{layer}", members, 4 * size, size)
+        yield from _norm_shapes("norm_out", members, size)
+        yield from _linear_shapes("out", members, size, outputs)
+
     def __call__(self, ops: Operations, weights: Mapping[str, Any], x: Any, state: Any = None) -> tuple[Any, Any]:
         """See :class:`Network`; the state is the keys and values ``(M, n, heads, t, width / heads)`` of each block."""
 
@@ -222,3 +250,13 @@ def _positions(first: int, count: int, width: int) -> npt.NDArray[np.float64]:
     rates = np.exp(-math.log(1000.0) * np.arange(0, width, 2) / width)
     angles = np.arange(first, first + count)[:, None] * rates
     return np.stack([np.sin(angles), np.cos(angles)], axis=2).reshape(count, -1)[:, :width]
+
+
+def _linear_shapes(name: str, members: int, rows: int, columns: int) -> Iterator[tuple[str, tuple[int, ...]]]:
+    yield name, (members, rows, columns)
+    yield f"{name}_bias", (members, columns)
+
+
+def _norm_shapes(name: str, members: int, size: int) -> Iterator[tuple[str, tuple[int, ...]]]:
+    yield name, (members, size)
+    yield f"{name}_bias", (members, size)

@@ -171,7 +171,7 @@ def _about_searches() -> list[Call]:
         ("--condition", "neither"): "--condition",
         ("--task", "nothing"): "no task 'nothing'",
         ("--task", "no.yaml"): "no.yaml",
-        ("--task", "task.yaml"): "a task must be a mapping",
+        ("--task", "task.yaml"): "must be a mapping",
         ("--set", "obstacle_cost=a"): "`obstacle_cost` must be",
         ("--set", "max_obstacles=-1"): "`max_obstacles` must be",
         ("--start-from", "kitchen.txt"): "expected a table",

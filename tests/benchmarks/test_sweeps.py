@@ -44,48 +44,60 @@ def test_every_combination_is_one_trial() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"workspaces": []}, "missing or empty"),
+        ({"workspaces": []}, "`workspaces` must have at least 1 entry, got 0"),
         ({"workspaces": 3}, "`workspaces` must be a name, a table or a list of these, got 3"),
         ({"emitters": 0.5}, "`emitters` must be a name, a table or a list of these, got 0.5"),
         ({"seeds": True}, "`seeds` must be a list or an integer .* got True"),
-        ({"grid": 1}, "unknown: 'grid'"),
+        ({"grid": 1}, "unknown key 'grid'; known: name, workspaces, emitters"),
         ({"workspaces": [{"shape": [5, 5]}]}, "key `workspace`"),
         ({"workspaces": ["kitchen"]}, "kitchen"),
         ({"workspaces": [{"workspace": "overcooked", "shape": [2, 2]}]}, "workspace 'overcooked shape=2x2'"),
         ({"workspaces": [KITCHEN, KITCHEN]}, "more than once"),
         ({"emitters": ["nobody"]}, "emitter 'nobody'"),
         ({"emitters": [{"emitter": "improve", "speed": 3}]}, "no option speed"),
-        ({"objectives": ["beauty"]}, "`objectives` must be one of .* got 'beauty'"),
-        ({"evaluations": 0}, "`evaluations` must be an integer >= 1, got 0"),
-        ({"evaluations": "many"}, "`evaluations` must be an integer"),
+        ({"objectives": ["beauty"]}, r"`objectives\[0\]` must be .* got 'beauty'"),
+        ({"evaluations": 0}, r"`evaluations\[0\]` must be an integer >= 1, got 0"),
+        ({"evaluations": "many"}, r"`evaluations\[0\]` must be an integer"),
         ({"seeds": []}, "empty"),
         ({"predictors": ["crystal-ball"]}, "crystal-ball"),
-        ({"people": 3}, "must be a table"),
-        ({"people": {"participants": 0}}, "`participants` of `people` .*must be an integer from 1"),
-        ({"people": {"participants": "a"}}, "`participants` of `people` .*got 'a'"),
+        ({"people": 3}, "`people` must be a mapping, got 3"),
+        ({"people": {"participants": 0}}, "`people.participants` must be an integer from 1 to 100000, got 0"),
+        ({"people": {"participants": "a"}}, "`people.participants` must be .*got 'a'"),
         ({"predictors": ["bayesian", "bayesian"]}, "`predictors` .*more than once"),
-        ({"predictors": 3}, "`predictors` must hold texts, got 3"),
+        ({"predictors": 3}, "`predictors` must be a text or a list of texts, got 3"),
         ({"workspaces": [KITCHEN | {"predictors": []}], "predictors": ["crystal-ball"]}, "crystal-ball"),
-        ({"workspaces": [KITCHEN | {"people": {}, "predictors": []}], "people": 3}, "`people` must be a table, got 3"),
-        ({"workspaces": [KITCHEN | {"label": 3}]}, "`label` of entry 1 of `workspaces` must be a text, got 3"),
-        ({"workspaces": [KITCHEN | {"shape": date(2020, 1, 1)}]}, r"`workspaces\[1\]\.shape` must be .* 2020-01-01"),
-        ({"workspaces": [KITCHEN | {"beta": math.nan}]}, r"`workspaces\[1\]\.beta` must be finite, got nan"),
+        (
+            {"workspaces": [KITCHEN | {"people": {}, "predictors": []}], "people": 3},
+            "`people` must be a mapping, got 3",
+        ),
+        ({"workspaces": [KITCHEN | {"label": 3}]}, r"`workspaces\[0\].label` must be a non-empty text, got 3"),
+        (
+            {"workspaces": [KITCHEN | {"shape": date(2020, 1, 1)}]},
+            r"`workspaces\[0\]\.shape` must be .* date or time 2020-01-01",
+        ),
+        ({"workspaces": [KITCHEN | {"beta": math.nan}]}, r"`workspaces\[0\]\.beta` must be a finite number, got nan"),
         ({"workspaces": [KITCHEN | {"beta": "a"}]}, "`beta` must be"),
         ({"workspaces": [KITCHEN | {"a b": 1}]}, "a b"),
-        ({"workspaces": [[]]}, r"entry 1 of `workspaces` must be a name or a table .* got \[\]"),
+        ({"workspaces": [[]]}, r"`workspaces\[0\]` must be a name or a table .* got \[\]"),
         ({"emitters": [{"emitter": "improve", "climbs": "a"}]}, "`climbs` must be an integer"),
         ({"emitters": [{"emitter": "ribs.emitters:GaussianEmitter"}]}, "sigma"),
         ({"emitters": [{"emitter": "ribs.emitters:GaussianEmitter", "sigma": "a"}]}, "GaussianEmitter sigma=a"),
-        ({"emitters": [3]}, "entry 1 of `emitters`"),
+        ({"emitters": [3]}, r"`emitters\[0\]` must be a name or a table"),
         ({"evaluations": [5, 5]}, "`evaluations` has 5 more than once"),
-        ({"evaluations": 10**30}, "`evaluations` must be an integer"),
-        ({"objectives": [3]}, "`objectives` must hold texts, got 3"),
+        ({"evaluations": 10**30}, r"`evaluations\[0\]` must be an integer from 1 to"),
+        ({"seeds": 10**200}, "`seeds` must be a number of at most 128 bits, got 1000"),
+        ({"workspaces": 2**63}, "`workspaces` must be a name, a table or a list of these, got 9223372036854775808"),
+        (
+            {"emitters": [{"emitter": "improve", "batch_size": math.inf}]},
+            r"`emitters\[0\].batch_size` must be a finite",
+        ),
+        ({"objectives": [3]}, r"`objectives\[0\]` must be "),
         ({"seeds": 10**9}, "`seeds` must be a list or an integer from 1"),
         ({"seeds": [1, -1]}, "`seeds` must be an integer >= 0, got -1"),
         ({"seeds": 900_000, "evaluations": [1, 2]}, "that makes 3,600,000 searches"),
         ({"name": "a/b"}, "`name` must be the name of a file"),
         ({"name": 3}, "`name` must be the name of a file .* got 3"),
-        ({"workspace": ["overcooked"]}, "unknown: 'workspace' \\(did you mean `workspaces`\\?\\)"),
+        ({"workspace": ["overcooked"]}, "unknown key 'workspace' \\(did you mean `workspaces`\\?\\)"),
         ({"predictors": ["bayesian"], "people": {"population": "nobody"}}, "people of .*`population` must be one of"),
         (
             {"workspaces": ["overcooked", "tabletop"], "predictors": ["bayesian"]},
@@ -101,10 +113,10 @@ def test_what_cannot_be_run_is_named_before_anything_runs(change: dict[str, Any]
 def test_files_are_named_in_errors(tmp_path: Path) -> None:
     broken = tmp_path / "broken.toml"
     broken.write_text("seeds = = 3")
-    with pytest.raises(SweepError, match=r"broken\.toml is not TOML"):
+    with pytest.raises(SweepError, match=r"broken\.toml: not valid TOML"):
         Sweep.from_toml(broken)
     broken.write_text("seeds = 3")
-    with pytest.raises(SweepError, match=r"broken\.toml: a sweep needs `workspaces`"):
+    with pytest.raises(SweepError, match=r"broken\.toml: the sweep lacks the key `workspaces`"):
         Sweep.from_toml(broken)
 
 

@@ -65,13 +65,13 @@ ALLOWED = {
 CONTENTS = {
     (OvercookedEnv, "layout"): (LayoutError, "row 0, column 0|genome"),
     (OvercookedWorkspace, "locked"): (LayoutError, "cannot lock 'a'"),
-    (OvercookedWorkspace, "task"): (TaskError, "the task has missing keys"),
+    (OvercookedWorkspace, "task"): (TaskError, "the task has the unknown key"),
     (OvercookedWorkspace, "start_from"): (LayoutError, "row 0, column 0"),
-    (TabletopEnv, "task"): (TaskError, "no task 'a'|the task has missing keys"),
-    (TabletopEnv, "layout"): (LayoutError, "not valid JSON|a layout with `schema`|genome"),
+    (TabletopEnv, "task"): (TaskError, "no task 'a'|the task has the unknown key"),
+    (TabletopEnv, "layout"): (LayoutError, "not valid JSON|the layout has the unknown key|genome"),
     (TabletopEnv, "predictor"): (ValueError, "no predictor named 'a'"),
-    (TabletopWorkspace, "task"): (TaskError, "no task 'a'|the task has missing keys"),
-    (TabletopWorkspace, "start_from"): (LayoutError, "a layout with `schema`"),
+    (TabletopWorkspace, "task"): (TaskError, "no task 'a'|the task has the unknown key"),
+    (TabletopWorkspace, "start_from"): (LayoutError, "the layout has the unknown key"),
 }
 """Descriptions of a layout, task or predictor that have the right type: the error says what is wrong in them."""
 

@@ -72,7 +72,7 @@ def test_made_without_importing(name: str) -> None:
 
 
 def test_import_is_light() -> None:
-    heavy = ["numba", "ribs", "sklearn", "torch", "pymunk", "pygame", "pandas", "scipy", "networkx"]
+    heavy = ["numba", "ribs", "sklearn", "torch", "pymunk", "pygame", "pandas", "scipy", "networkx", "pydantic", "yaml"]
     packages = "legible_envs, legible_envs.overcooked, legible_envs.tabletop"
     code = f"import sys, {packages}; print([m for m in {heavy} if m in sys.modules])"
     assert in_a_new_process(code) == "[]"

@@ -166,6 +166,25 @@ def test_networkx_export():
     assert set(graph.predecessors("soup 2: serve")) == {"soup 2: onion", "soup 2: cabbage"}
 
 
+TASK = {"start": "s", "subtasks": [{"name": "a", "goals": "x"}]}
+
+ALIASES = "\n".join(f"{b}: &{b} [{', '.join([f'*{a}'] * 8)}]" for a, b in zip("abcdefgh", "bcdefghi", strict=True))
+
+
+def test_a_single_name_stands_for_a_list_and_null_for_nothing():
+    data = {"start": "s", "subtasks": [{"name": "a", "goals": ["x"]}], "groups": {"g": ["a"]}}
+    text = "start: s\nsubtasks:\n- name: a\n  goals: x\n  after:\n  then:\n  count:\ngroups: {g: a}\nmax_open:"
+    assert TaskGraph.from_yaml(text) == TaskGraph.from_dict(data) == TaskGraph.from_dict({**data, "groups": {"g": "a"}})
+    assert TaskGraph.from_dict({**data, "subtasks": ({"name": "a", "goals": ("x",)},)}) == TaskGraph.from_dict(data)
+
+
+def test_messages_about_files_begin_with_their_path(tmp_path):
+    path = tmp_path / "task.yaml"
+    path.write_text("start: s\nsubtasks: [{name: a, goals: 0}]")
+    with pytest.raises(TaskError, match=r"task\.yaml: the task: `subtasks\[0\].goals` must be"):
+        TaskGraph.from_yaml(path)
+
+
 @pytest.mark.parametrize(
     ("build", "message"),
     [
@@ -192,9 +211,36 @@ def test_networkx_export():
         (lambda: TaskGraph([Subtask("a", ("b",))], "s", groups={"g": 3}), "group 'g' of `groups` must hold non-empty"),
         (lambda: TaskGraph.from_yaml("start: [unclosed"), "not valid YAML"),
         (lambda: TaskGraph.from_yaml("just text"), "must be a mapping"),
-        (lambda: TaskGraph.from_dict({"start": "s"}), r"missing keys \['subtasks'\]"),
-        (lambda: TaskGraph.from_dict({"start": "s", "subtasks": [{"name": "a", "goals": "x", "befor": []}]}), "befor"),
-        (lambda: TaskGraph.from_dict({"start": "s", "subtasks": "a"}), "must be a list"),
+        (lambda: TaskGraph.from_dict({"start": "s"}), "the task lacks the key `subtasks`"),
+        (
+            lambda: TaskGraph.from_dict({"start": "s", "subtasks": [{"name": "a", "goals": "x", "befor": []}]}),
+            "'befor'; known: name",
+        ),
+        (lambda: TaskGraph.from_dict({"start": "s", "subtasks": "a"}), "`subtasks` must be a list, got 'a'"),
+        (
+            lambda: TaskGraph.from_dict(TASK | {"groups": {"g": -1}}),
+            "`groups.g` must be a text or a list of texts, got -1",
+        ),
+        (
+            lambda: TaskGraph.from_dict({"start": "s", "subtasks": [{"name": None, "goals": "x"}]}),
+            "lacks the key `name`",
+        ),
+        (
+            lambda: TaskGraph.from_dict({"start": "s", "subtasks": [{"name": "a", "goals": 0}]}),
+            r"`subtasks\[0\].goals`",
+        ),
+        (
+            lambda: TaskGraph.from_dict({"start": "s", "subtasks": [{"name": "a", "goals": "x", "count": 10**200}]}),
+            r"`subtasks\[0\].count` must be an integer from 1 to 1000, got 1000",
+        ),
+        (
+            lambda: TaskGraph.from_dict({"start": "s", "subtasks": TASK["subtasks"] * 129}),
+            "`subtasks` must have at most 128 entries, got 129",
+        ),
+        (
+            lambda: TaskGraph.from_yaml("a: &a [x, x, x, x, x, x, x, x]\n" + ALIASES),
+            "more than 100,000 values, aliases unfolded",
+        ),
     ],
 )
 def test_bad_tasks_are_named(build, message):

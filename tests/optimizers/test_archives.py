@@ -109,3 +109,29 @@ def test_a_damaged_file_is_refused_by_name(tmp_path, damage):
         np.savez(path, solution=np.zeros(3))
     with pytest.raises(SearchError, match=r"archive\.npz is not an archive written by a search"):
         read_archive(path)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"objective": np.array([0.5, np.nan])}, r"`objective` must be finite, got nan at \[1\]"),
+        ({"objective": np.array(0.5)}, r"`objective` must be floats of shape \(any\), got float64 of shape \(\)"),
+        ({"solution": np.zeros((3, 2))}, r"`solution` must be .* of shape \(2, any\), got float64 of shape \(3, 2\)"),
+        ({"measures": np.zeros(2)}, r"`measures` must be numbers of shape \(2, any\)"),
+        ({"index": np.array([4, 4])}, "`index` must hold numbers of cells from 0 on, each once"),
+        ({"index": np.array([-1, 4])}, "`index` must hold numbers of cells from 0 on, each once"),
+        ({"index": np.array([[1], [2]], dtype=object)}, "pickled objects, which are never loaded"),
+    ],
+)
+def test_arrays_that_do_not_fit_each_other_are_named(tmp_path, changes, message):
+    whole = {
+        "solution": np.zeros((2, 3), dtype=np.int64),
+        "objective": np.array([0.5, 1.5]),
+        "measures": np.zeros((2, 2)),
+        "index": np.array([3, 9]),
+    }
+    np.savez(tmp_path / "archive.npz", **whole)
+    assert len(read_archive(tmp_path / "archive.npz")["index"]) == 2
+    np.savez(tmp_path / "archive.npz", **{**whole, **changes})
+    with pytest.raises(SearchError, match=rf"archive\.npz is not an archive .*: .*{message}"):
+        read_archive(tmp_path / "archive.npz")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -284,15 +285,28 @@ def test_files_of_others_are_refused(on_reaches: NeuralPredictor, tmp_path: Path
     with pytest.raises(FileNotFoundError):
         RecurrentPredictor.load(tmp_path / "nothing.npz")
     arrays = dict(np.load(path))
+    parameters = json.loads(arrays["config"].tobytes())["parameters"]
     for name, changes in (
         ("kind", {"kind": "something"}),
         ("schema", {"schema": 99}),
         ("fit its parameters", {"weights/out": np.zeros((1, 1, 1))}),
         ("not finite", {"weights/out": np.full_like(arrays["weights/out"], np.nan)}),
-        ("Object arrays", {"weights/out": np.array([{}], dtype=object)}),
+        ("pickled objects", {"weights/out": np.array([{}], dtype=object)}),
     ):
         np.savez(tmp_path / "bad.npz", **{**arrays, **changes})
         with pytest.raises(ValueError, match=name if name != "kind" else "not a file of a neural"):
+            type(on_reaches).load(tmp_path / "bad.npz")
+    for name, changes in (
+        ("unknown parameters", {"parameters": {"units": 3}}),
+        ("`num_layers` must be an integer from 1", {"parameters": {"num_layers": 10**9}}),
+        ("fit its parameters", {"parameters": {**parameters, "num_layers": 64}}),
+        (r"`classes\[0\]` must be a non-empty text, got 3", {"classes": [3]}),
+        ("`encoding` must be a mapping", {"encoding": []}),
+        ("it holds a 'x' predictor", {"predictor": "x"}),
+    ):
+        config = json.dumps({**json.loads(arrays["config"].tobytes()), **changes}).encode()
+        np.savez(tmp_path / "bad.npz", **{**arrays, "config": np.frombuffer(config, dtype=np.uint8)})
+        with pytest.raises(ValueError, match=name):
             type(on_reaches).load(tmp_path / "bad.npz")
     (tmp_path / "cut.npz").write_bytes(path.read_bytes()[:200])
     with pytest.raises(ValueError, match="cannot read"):
@@ -423,3 +437,9 @@ def test_parameters_shared_by_all_networks_are_named_by_each() -> None:
         assert repr(kind(members=2)) == f"{kind.__name__}(members=2)"
         with pytest.raises(TypeError, match="membres"):
             kind(membres=2)  # type: ignore[call-arg]
+
+
+@pytest.mark.parametrize("network", [Gru(3, 2), Transformer(8, 2, 4)])
+def test_shapes_of_weights_are_known_before_they_are_made(network: Network) -> None:
+    weights = network.initial_weights(2, 5, 4, np.random.default_rng(0))
+    assert dict(network.shapes(2, 5, 4)) == {name: value.shape for name, value in weights.items()}

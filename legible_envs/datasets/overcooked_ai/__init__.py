@@ -11,7 +11,6 @@ games published in 2019 need no file: :mod:`legible_envs.datasets.overcooked_201
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -27,6 +26,7 @@ from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.rollouts.trajectory import Trajectory
 from legible_envs.support.csv_table import CsvSyntaxError, read_records
 from legible_envs.support.file_kinds import describe_file
+from legible_envs.support.plain_data import parse_json
 from legible_envs.support.text import decode_text
 
 __all__ = [
@@ -39,6 +39,7 @@ __all__ = [
     "trajectories_of_games",
 ]
 
+_MOST_CHARACTERS: Final = 32_000_000
 _EXPECTED: Final = (
     "expected a recording of Overcooked-AI: a table with the columns 'state', 'joint_action', 'layout', … as CSV or as "
     "a pickled pandas table, or a trajectory file in JSON with 'ep_states', 'ep_actions', …"
@@ -126,9 +127,11 @@ def _of_table(table: Mapping[str, npt.NDArray[Any]], where: Callable[[int], str]
 def _of_json(text: str, layouts: Mapping[str, OvercookedLayout]) -> list[RecordedGame] | None:
     from legible_envs.datasets.overcooked_ai.trajectory_json import convert_episodes, is_trajectory_json
 
+    if len(text) > _MOST_CHARACTERS:
+        raise RecordingsError(f"it has {len(text):,} characters; JSON of at most {_MOST_CHARACTERS:,} is read")
     try:
-        content = json.loads(text)
-    except (ValueError, RecursionError):
+        content = parse_json(text, finite=False, most=_MOST_CHARACTERS)
+    except ValueError:
         return None
     return convert_episodes(content, layouts) if is_trajectory_json(content) else None
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -165,6 +166,23 @@ def test_other_files_are_refused(tmp_path: Path) -> None:
     np.savez(tmp_path / "other.npz", x=np.zeros(3))
     with pytest.raises(ValueError, match="no recorded play"):
         load_played(tmp_path / "other.npz")
+    game = Played(OvercookedLayout.from_ascii(TINY), (("onion",),), actions=np.int8([0, 5]), episodes=np.int32([0, 0]))
+    replace(game, rewards=np.zeros(2)).save(tmp_path / "mine.npz")
+    with np.load(tmp_path / "mine.npz") as file:
+        arrays = dict(file)
+    for changes, message in (
+        ({"actions": np.array([0, 6])}, "`actions` must be numbers from 0 to 5"),
+        ({"episodes": np.array([0, 7])}, "`episodes` must count the games from 0"),
+        ({"rewards": np.zeros(3)}, r"`rewards` must be floats of shape \(2\), got float64 of shape \(3,\)"),
+        (
+            {"about": np.array(str(arrays["about"]).replace('"onion"', '"cake"'))},
+            r"`about`: `recipes\[0\]\[0\]` must be one of",
+        ),
+        ({"about": np.array("[1]")}, "`about` must be a mapping, got"),
+    ):
+        np.savez(tmp_path / "mine.npz", **{**arrays, **changes})
+        with pytest.raises(ValueError, match=rf"mine\.npz is no recorded play: {message}"):
+            load_played(tmp_path / "mine.npz")
 
 
 def test_soups_fit_the_kitchen() -> None:

@@ -120,13 +120,19 @@ def test_a_layout_of_an_unknown_kind_is_named(tmp_path: Path) -> None:
     records = arrays["records"].tobytes().replace(b'"kind": "tabletop"', b'"kind": "seesaw"')
     np.savez(tmp_path / "w.npz", **{**arrays, "records": np.frombuffer(records, dtype=np.uint8)})
     known = r"'seesaw'; known: \['overcooked', 'tabletop'.*entry point group 'legible.layouts'"
-    with pytest.raises(ValueError, match=f"w.npz: no layout kind named {known}"):
+    with pytest.raises(ValueError, match=f"w.npz: layout 0: no layout kind named {known}"):
         load_trajectories(tmp_path / "w.npz")
     write_csv(tmp_path / "w.csv", [reach([(0.1, 0.1)], layout=TABLES[0])])
     header, row = (tmp_path / "w.csv").read_text().splitlines()
     (tmp_path / "w.csv").write_text(f"{header},layout_kind\n{row},seesaw\n")
     with pytest.raises(ValueError, match=f"trajectory '0': no layout kind named {known}"):
         read_csv(tmp_path / "w.csv")
+
+
+def records(**changes: object) -> np.ndarray:
+    record = {"start": "s", "goal": "a", "candidates": ["a", "b"], "layout": None} | changes
+    content = {"layouts": [], "trajectories": [record]}
+    return np.frombuffer(json.dumps(content).encode(), dtype=np.uint8)
 
 
 def test_unreadable_files_are_refused_in_words(tmp_path: Path) -> None:
@@ -143,7 +149,17 @@ def test_unreadable_files_are_refused_in_words(tmp_path: Path) -> None:
     for change, message in (
         ({"schema": 99}, "schema 99"),
         ({"kind": "cake"}, "it looks like an .npz with the arrays .*; expected"),
-        ({"offsets": np.array([0, 5])}, "offsets"),
+        ({"offsets": np.array([0, 5])}, "`offsets` must rise from 0 to the number of states, 2"),
+        (
+            {"offsets": np.array([0, 2, 2])},
+            r"`offsets` must be whole numbers of shape \(2\), got int64 of shape \(3,\)",
+        ),
+        ({"times": np.array(0.0)}, r"`times` must be numbers of shape \(2\), got float64 of shape \(\)"),
+        ({"times": np.array([0.0, np.nan])}, r"`times` must be finite, got nan at \[1\]"),
+        ({"states": np.zeros(2)}, r"`states` must be numbers of shape \(any, any\), got float64 of shape \(2,\)"),
+        ({"records": records(layout=7)}, "trajectory 0 names layout 7; the file has 0, from 0 on"),
+        ({"records": records(candidates="ab")}, r"`trajectories\[0\].candidates` must be a list, got 'ab'"),
+        ({"records": records(goal=3)}, r"`trajectories\[0\].goal` must be a non-empty text, got 3"),
         ({"records": np.frombuffer(b"{}", dtype=np.uint8)}, "layouts"),
     ):
         np.savez(tmp_path / "bad.npz", **{**arrays, **change})

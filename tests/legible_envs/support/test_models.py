@@ -2,13 +2,29 @@
 
 from __future__ import annotations
 
+from types import MappingProxyType
 from typing import Annotated
 
+import numpy as np
 import pytest
 from pydantic import Field
 
 from legible_envs.errors import TaskError
-from legible_envs.support.models import Choice, FileModel, Flag, Length, Real, Text, Whole, validated
+from legible_envs.support.models import (
+    Checked,
+    Choice,
+    FileModel,
+    Flag,
+    Length,
+    OneOrMore,
+    Real,
+    Text,
+    Whole,
+    YamlModel,
+    as_plain,
+    validated,
+)
+from legible_envs.support.validation import integer
 
 
 class Part(FileModel):
@@ -74,3 +90,29 @@ def test_wrong_data_are_refused_in_our_words(data, message):
     with pytest.raises(TaskError) as refusal:
         validated(Content, data, "the file", error=TaskError)
     assert str(refusal.value) == message
+
+
+class Task(YamlModel):
+    names: Annotated[list[Annotated[str, Text()]], Length(0, 3), OneOrMore()] = []
+    even: Annotated[int, Checked(lambda name, value: integer(name, value, 0, 8))] = 0
+
+
+def test_one_text_stands_for_a_list_and_null_for_nothing_said():
+    assert validated(Task, {"names": "a", "even": None}) == Task(names=["a"])
+    with pytest.raises(ValueError, match=r"^`names` must be a text or a list of texts, got \{\}$"):
+        validated(Task, {"names": {}})
+    with pytest.raises(ValueError, match=r"^`even` must be an integer from 0 to 8, got 9$"):
+        validated(Task, {"even": 9})
+    with pytest.raises(
+        ValueError, match=r"^it has the unknown key 'name' \(did you mean `names`\?\); known: names, even$"
+    ):
+        validated(Task, {"name": "a"})
+
+
+def test_data_of_a_program_become_those_of_a_file():
+    data = as_plain({"a": (1, np.int8(2), {"b": np.zeros((1, 2))}), "c": MappingProxyType({"d": None})})
+    assert data == {"a": [1, 2, {"b": [[0.0, 0.0]]}], "c": {"d": None}}
+    endless: list[object] = []
+    endless.append(endless)
+    with pytest.raises(ValueError, match="nested too deeply"):
+        as_plain(endless)

@@ -90,8 +90,8 @@ def test_a_line_that_was_cut_off_is_left_out(tmp_path: Path, workspace: Overcook
         (lambda f: (f / "archive.npz").write_bytes((f / "archive.npz").read_bytes()[:500]), "damaged"),
         (lambda f: np.savez(f / "archive.npz", solution=np.zeros((1, 32))), "lacks the arrays"),
         (
-            lambda f: np.savez(f / "archive.npz", solution=np.zeros((2, 32)), objective=[1], measures=[1], index=[1]),
-            "different lengths",
+            lambda f: np.savez(f / "archive.npz", solution=np.zeros((2, 32)), objective=[1.0], measures=[1], index=[1]),
+            r"`solution` must be numbers of shape \(1, any\), got float64 of shape \(2, 32\)",
         ),
         (
             lambda f: np.savez(
