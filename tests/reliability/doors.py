@@ -38,6 +38,7 @@ from legible_envs.tabletop.humans import simulate_participants as simulate_reach
 from legible_envs.tabletop.partner.belief import GoalBelief
 from predictors import TimeSeriesGaussian, make_predictor
 from tests.reliability.compiled_functions import called, kernels, takes_generator
+from tests.support.rough_hands import SPEEDS, RoughHand, rough_table
 
 DOCUMENTED = (ValueError, TypeError, gymnasium.error.Error)
 NUMBERS = (0, 1, -1, 2, 5, 6, 7, 127, 128, -128, 255, 2**15, 2**31, -(2**31), 2**62, -(2**63))
@@ -310,6 +311,19 @@ def table(chaos: Chaos) -> None:
         env.step(chaos.array(np.array([1.0, -1.0], dtype=np.float32)))
 
 
+def pushes(chaos: Chaos) -> None:
+    """Hands that press objects into others and into the rim, and put them down on others."""
+    for number in range(6) if chaos.good else (int(chaos.rng.integers(100)),):
+        speed = chaos.one(SPEEDS)
+        env, layout = rough_table(number, speed, chaos.rng)
+        env.reset(seed=number, options={"layout": layout})
+        hand = RoughHand(env, chaos.rng)
+        for _ in range(200 if chaos.good else 10):
+            if env.step(hand())[2]:
+                break
+        env.step(chaos.array(np.array([1.0, -1.0], dtype=np.float32)))
+
+
 DOORS: tuple[tuple[Callable[[Chaos], None], int], ...] = (
     (designs, 20),
     (keys, 5),
@@ -323,6 +337,7 @@ DOORS: tuple[tuple[Callable[[Chaos], None], int], ...] = (
     (paths, 20),
     (reach, 5),
     (table, 1),
+    (pushes, 1),
 )
 """Every door, and how often it is tried for one try of the slowest."""
 
