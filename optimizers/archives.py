@@ -188,7 +188,8 @@ def read_archive(path: Path) -> dict[str, npt.NDArray[Any]]:
                 raise SearchError(f"{refusal}: it lacks the arrays {missing}, it has {sorted(stored)}")
             objective = stored_array(stored, "objective", "f", (None,), finite=True)
             rows = len(objective)
-            index = stored_array(stored, "index", "iu", (rows,))
+            kinds = "iu" if rows else "iuf"  # pyribs gives the cells of an empty archive as floats
+            index = stored_array(stored, "index", kinds, (rows,))
             if rows and (index.min() < 0 or len(np.unique(index)) < rows):
                 raise ValueError("`index` must hold numbers of cells from 0 on, each once")
             arrays = {

@@ -126,7 +126,7 @@ def _about_searches() -> list[Call]:
         (*gaussian, "--emitter-option", "sigma"): "is not NAME=VALUE",
         ("--emitter-option", "=3"): "is not NAME=VALUE",
         ("--emitter-option", "nosuch=3"): "no option nosuch",
-        ("--emitter-option", "climbs=0"): "`climbs` must be an integer >= 1, got 0",
+        ("--emitter-option", "climbs=0"): "`climbs` must be an integer from 1 to 1000000, got 0",
         ("--emitter-option", "climbs=a"): "got 'a'",
         ("--emitter-option", "climbs=[1, 2]"): "got [1, 2]",
         ("--emitter-option", "climbs=1", "--emitter-option", "climbs=2"): "climbs is given twice",

@@ -29,7 +29,7 @@ def small_experiment(monkeypatch: pytest.MonkeyPatch) -> None:
     """An experiment like the real ones: trials, a table from their results, sections from the table."""
     module, analysis = types.ModuleType("small_experiment"), types.ModuleType("small_experiment.analysis")
 
-    def reproduce(folder, *, quick, seeds, workers, scheduler, progress):
+    def reproduce(folder, *, quick, seeds, workers, scheduler, progress, **_):
         trials = [{"seed": seed} for seed in range(seeds or (2 if quick else 4))]
         rows = run_trials(
             "tests.benchmarks.trial_functions:draw", trials, folder, workers=1, scheduler=scheduler, progress=progress

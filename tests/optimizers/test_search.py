@@ -218,7 +218,7 @@ def test_emitters_that_do_not_count_propose_that_many_layouts():
         ({"evaluations": 0}, "`evaluations` must be an integer >= 1, got 0"),
         ({"evaluations": 5, "iterations": (1, 1)}, "either evaluations or iterations"),
         ({"iterations": (0, 5)}, "random layouts"),
-        ({"initial": 0}, "`initial` must be an integer >= 1, got 0"),
+        ({"initial": 0}, "`initial` must be an integer from 1 to 1000000, got 0"),
         ({"resume": True}, "resume needs checkpoint="),
         ({"resume": "yes", "checkpoint": "x"}, "`resume` must be one of \\[True, False, 'auto'\\], got 'yes'"),
         ({"emitter": []}, "at least one emitter"),

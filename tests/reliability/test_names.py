@@ -389,5 +389,5 @@ def test_folders_are_written_inside_the_folder_that_was_named(tmp_path, files, m
         Path("inside/run", LIST).write_text(json.dumps({"placement": ".", "both": name}))
         result = legible(*run[:2], "--resume", "--evaluations", 40, "--quiet", "--out", "inside/run")
         assert result.exit_code == 2, result.output
-        assert "must be the name of a file" in result.output
+        assert "must be '.' or" in result.output
     assert {path.name for path in tmp_path.iterdir()} == {"task.yaml", "table.json", "inside"}

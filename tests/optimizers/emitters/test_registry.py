@@ -93,7 +93,7 @@ def test_an_emitter_that_cannot_be_had_is_explained(spec, message):
 
 
 def test_a_value_an_emitter_refuses_is_passed_on_in_its_words():
-    with pytest.raises(EmitterError, match="improve: `fanout` must be an integer >= 1, got 0"):
+    with pytest.raises(EmitterError, match="improve: `fanout` must be an integer from 1 to 1000000, got 0"):
         search(SHELF, emitter_options={"fanout": 0})
 
 
