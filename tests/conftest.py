@@ -18,7 +18,8 @@ os.environ.setdefault("MPLBACKEND", "Agg")  # before anything imports matplotlib
 from tests.support.example_package import install
 
 PACKAGES = ("legible_envs", "optimizers", "predictors", "benchmarks")
-EXAMPLES = Path(__file__).parent.parent / "docs" / "examples"
+TESTS = Path(__file__).parent
+EXAMPLES = TESTS.parent / "docs" / "examples"
 
 
 @cache
@@ -38,6 +39,13 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--thorough", action="store_true", help="try what tests/reliability tries a hundred times as often"
     )
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what coverage of the three libraries can do without: tests of the command line, and of reliability."""
+    for item in items:
+        if any(item.path.is_relative_to(TESTS / folder) for folder in ("benchmarks", "reliability")):
+            item.add_marker("untraced")
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
