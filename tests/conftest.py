@@ -16,6 +16,7 @@ import pytest
 os.environ.setdefault("MPLBACKEND", "Agg")  # before anything imports matplotlib: tests open no windows
 
 from tests.support.example_package import install
+from tests.support.repeats import Repeats
 
 PACKAGES = ("legible_envs", "optimizers", "predictors", "benchmarks")
 TESTS = Path(__file__).parent
@@ -35,10 +36,8 @@ def missing_recordings() -> str:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """The option of tests/reliability."""
-    parser.addoption(
-        "--thorough", action="store_true", help="try what tests/reliability tries a hundred times as often"
-    )
+    """``--thorough``, for tests that count their attempts (`repeats`)."""
+    parser.addoption("--thorough", action="store_true", help="random cases in full numbers; takes hours")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -55,6 +54,13 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
     if os.environ.get("LEGIBLE_REQUIRE_DATA", "0") not in ("", "0"):
         pytest.fail(f"LEGIBLE_REQUIRE_DATA is set, but {reason}", pytrace=False)
     pytest.skip(reason)
+
+
+@pytest.fixture
+def repeats(request: pytest.FixtureRequest) -> Repeats:
+    """``repeats(few, many)``: how often to try; ``many`` with ``--thorough``."""
+    thorough = request.config.getoption("thorough")
+    return lambda few, many: many if thorough else few
 
 
 @pytest.fixture

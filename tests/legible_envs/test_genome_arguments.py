@@ -89,9 +89,9 @@ def test_fractions_are_no_kitchen():
 def test_counts_and_generators_are_checked(ws):
     batch, rng = genomes(ws), np.random.default_rng(0)
     for count in (2.5, -1, None, "3", True):
-        with pytest.raises(ValueError, match="`n` must be an integer >= 0, got"):
+        with pytest.raises(ValueError, match="`n` must be an integer from 0 to 1000000, got"):
             ws.sample(count, rng)
-        with pytest.raises(ValueError, match="`k` must be an integer >= 0, got"):
+        with pytest.raises(ValueError, match=r"`k` must be an integer .*, got"):
             ws.perturb(batch, count, rng)
     for generator in (None, 0, np.random.RandomState(0), np.random):
         with pytest.raises(ValueError, match="`rng` must be a numpy random Generator"):

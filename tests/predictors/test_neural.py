@@ -355,7 +355,7 @@ for name in {names}:
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
-        ({"hidden_size": 0}, "`hidden_size` must be an integer >= 1"),
+        ({"hidden_size": 0}, "`hidden_size` must be an integer from 1 to 8192, got 0"),
         ({"members": 1.5}, "`members`"),
         ({"dropout": 1.0}, "`dropout`"),
         ({"learning_rate": -1}, "`learning_rate`"),

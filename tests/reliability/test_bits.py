@@ -21,7 +21,7 @@ from legible_envs.overcooked import OvercookedWorkspace
 from optimizers import SearchError, SearchResult, load_run, search
 from optimizers.archives import archive_arrays
 from tests.benchmarks import trial_functions
-from tests.reliability.conftest import Repeats
+from tests.support.repeats import Repeats
 from tests.support.shelf_workspace import ShelfWorkspace
 
 SHELF = ShelfWorkspace()

@@ -16,9 +16,9 @@ import pytest
 from benchmarks.trials import Event, TrialsStopped, run_trials
 from optimizers import ClusterError, SearchResult, search
 from optimizers.searching import SearchState
-from tests.reliability.conftest import Repeats
 from tests.reliability.worker_functions import draw
 from tests.support.clusters import LocalCluster, copy_of_the_packages, without_the_packages
+from tests.support.repeats import Repeats
 from tests.support.shelf_workspace import ShelfWorkspace
 
 Client = pytest.importorskip("distributed").Client

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import pytest
 
-from tests.reliability.conftest import Repeats
 from tests.reliability.file_formats import FORMATS
+from tests.support.repeats import Repeats
 
 FEW = dict.fromkeys(("trajectory npz", "trajectory CSV", "recorded games npz", "archive npz", "network npz"), 1000)
 """Attempts in the suite where 2,000 take too long: numpy writes a damaged ``.npz`` in milliseconds."""

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.reliability.conftest import Repeats
+from tests.support.repeats import Repeats
 
 pytestmark = [
     pytest.mark.slow,

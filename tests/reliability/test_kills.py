@@ -26,8 +26,8 @@ from optimizers import SearchError, SearchResult, load_run, search
 from optimizers.archives import archive_arrays, read_archive
 from optimizers.runs.folder import RunFolder
 from tests.benchmarks import trial_functions
-from tests.reliability.conftest import Repeats
 from tests.support.interruptions import killed_at
+from tests.support.repeats import Repeats
 from tests.support.shelf_workspace import ShelfWorkspace
 
 SHELF = ShelfWorkspace()

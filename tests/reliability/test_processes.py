@@ -16,8 +16,8 @@ import pandas as pd
 import pytest
 
 from benchmarks.trials import run_trials
-from tests.reliability.conftest import Repeats
 from tests.reliability.worker_functions import draw
+from tests.support.repeats import Repeats
 
 psutil = pytest.importorskip("psutil")
 

@@ -162,13 +162,13 @@ def test_kernel_equals_definition(shape):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("shape", SHAPES, ids=str)
-def test_kernel_equals_definition_on_thousands(shape):
-    """More than 5,000 random layouts together, half of them with the default task."""
+def test_kernel_equals_definition_on_thousands(shape, repeats):
+    """2,000 random layouts together, half of them with the default task; 5,000 with ``--thorough``."""
     rng = np.random.default_rng([7, *shape])
     big = shape[0] * shape[1] > 80
-    for _ in range(4 if big else 10):
+    for _ in range(2 if big else repeats(4, 10)):
         agree(shape, random_settings(rng) | {"tie_tolerance": 1e-9, "pots": 1}, 40, rng)
-    agree(shape, {}, 100 if big else 320, rng)
+    agree(shape, {}, 100 if big else repeats(120, 320), rng)
 
 
 def test_kernel_equals_brute_force_on_a_custom_task():

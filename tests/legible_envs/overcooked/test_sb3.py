@@ -154,6 +154,7 @@ def test_a_missing_library_is_named(monkeypatch):
         as_sb3(gym.make_vec(KITCHEN_ID, num_envs=1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("masked", [False, True])
 def test_learners_learn_on_it(masked):
     """Some updates of PPO, with masks and without; a learner that is told nothing would not change its policy."""

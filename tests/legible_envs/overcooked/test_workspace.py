@@ -290,6 +290,7 @@ def test_bad_arguments(arguments, error, message):
         OvercookedWorkspace(**arguments)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", [(33, 33), (34, 33), (33, 34), (64, 64), (3, 64)])
 def test_genomes_of_every_shape(shape):
     """Genomes are int8 where that holds every slot, as they always were, and int16 beyond."""

@@ -12,6 +12,7 @@ from click.testing import CliRunner
 from benchmarks.cli.app import main
 from legible_envs.datasets.pointing import load_pointing
 from legible_envs.rollouts import Trajectory, load_trajectories, save_trajectories, write_csv
+from legible_envs.support.files import open_npz
 from tests.legible_envs.rollouts.hostile import KITCHEN
 from tests.legible_envs.support.test_file_kinds import EXAMPLES
 
@@ -38,9 +39,9 @@ def test_no_message_advises_to_load_pickles(tmp_path: Path) -> None:
         path.write_bytes(content)
         with pytest.raises(ValueError, match="looks like"):
             load_trajectories(path)
-    np.savez(
-        path, kind="legible-envs trajectories", schema=1, states=np.array([{}]), times=[0], offsets=[0, 1], records=[0]
-    )
+    with open_npz(save_trajectories(tmp_path / "whole.npz", [WALK])) as stored:
+        arrays = dict(stored) | {"states": np.array([{}])}
+    np.savez(path, **arrays)
     with pytest.raises(ValueError, match="it holds pickled objects, which are never loaded"):
         load_trajectories(path)
     np.savez(path, kind="legible-envs trajectories", schema=1)

@@ -67,6 +67,7 @@ def literal_table(workspace, keys):
     return genome
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WORKSPACES)
 def test_the_kernel_reads_tables_as_its_rules_say(name):
     workspace = WORKSPACES[name]

@@ -105,8 +105,8 @@ def test_reaches_may_start_at_objects():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3, 7))
-def test_the_kernel_is_the_definition_on_many_random_tables(seed):
-    check_random(COLUMNS, seed, 150)
+def test_the_kernel_is_the_definition_on_many_random_tables(seed, repeats):
+    check_random(COLUMNS, seed, repeats(60, 150))
 
 
 def test_what_the_columns_task_can_reach():
