@@ -45,7 +45,7 @@ def test_no_message_advises_to_load_pickles(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="it holds pickled objects, which are never loaded"):
         load_trajectories(path)
     np.savez(path, kind="legible-envs trajectories", schema=1)
-    with pytest.raises(ValueError, match="states"):
+    with pytest.raises(ValueError, match="records"):
         load_trajectories(path)
 
 
