@@ -3,7 +3,12 @@
 Compiled code lies in ``$NUMBA_CACHE_DIR`` if the user set it, else in the user's cache folder (Linux:
 ``~/.cache/legible-envs/numba``), never beside the package. Deleting the folder is always safe. With
 ``NUMBA_DISABLE_JIT=1`` every kernel runs as plain Python; with ``NUMBA_BOUNDSCHECK=1`` an index outside an array is an
-``IndexError``. Code that checks lies in a folder of its own: numba would take one for the other.
+``IndexError``.
+
+Three times numba would take wrong code from its cache without a word: code that does not check its indices where it
+should, code that calls another file's kernel as it was before that file changed, and, where two processes compile one
+kernel for different types at once, the code of the other type. So code that checks lies in a folder of its own, all of
+it in a folder named after all kernels' sources, and every file in it is named after the types it was compiled for.
 """
 
 from __future__ import annotations
@@ -17,6 +22,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
+from numba.core.caching import IndexDataCacheFile
 from platformdirs import user_cache_path
 
 __all__ = ["cache_folder", "kernel"]
@@ -29,7 +35,7 @@ def cache_folder(package: str = "legible_envs") -> Path | None:
     """Folder of a package's compiled code, created on first use; None where nothing can be written."""
     root = os.environ.get("NUMBA_CACHE_DIR")
     try:
-        folder = Path(root) if root else user_cache_path("legible-envs") / "numba" / _kernels_digest(package)
+        folder = (Path(root) if root else user_cache_path("legible-envs") / "numba") / _kernels_digest(package)
         folder = folder / "boundscheck" if numba.config.BOUNDSCHECK else folder
         folder.mkdir(parents=True, exist_ok=True)
         return folder if os.access(folder, os.W_OK) else None
@@ -70,6 +76,25 @@ def kernel(function: _F) -> _F:
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(folder)
     try:
-        return numba.njit(cache=True, error_model="numpy")(function)
+        compiled = numba.njit(cache=True, error_model="numpy")(function)
     finally:
         numba.config.CACHE_DIR = before
+    files = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
+    if type(files) is IndexDataCacheFile:  # not where kernels run as plain Python
+        files.__class__ = FilesByType
+    return compiled
+
+
+class FilesByType(IndexDataCacheFile):  # type: ignore[misc]
+    """Numba's files of a kernel's compiled code, each named after the types that it was compiled for.
+
+    Numba numbers them. Of two processes that begin together, both may take the same number for different types, and the
+    index of the one then names the code of the other.
+    """
+
+    def save(self, key: Any, data: Any) -> None:
+        """Keep the code for some types, then the entry that names it: a reader never finds one without the other."""
+        overloads = self._load_index()
+        name = self._data_name(int(hashlib.sha256(repr(key).encode()).hexdigest()[:15], 16))
+        self._save_data(name, data)
+        self._save_index({**overloads, key: name})

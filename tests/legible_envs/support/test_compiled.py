@@ -5,11 +5,13 @@ from __future__ import annotations
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from numba.core.caching import IndexDataCacheFile
 
-from legible_envs.support.compiled import kernel
+from legible_envs.support.compiled import FilesByType, kernel
 
 OUTSIDE = """
 import sys
@@ -35,6 +37,29 @@ def test_a_kernel_takes_no_random_generator():
 
     with pytest.raises(TypeError, match=r"kernel draw takes a random generator, `rng`: Ctrl-C.*take `bits: Bits`"):
         kernel(draw)
+
+
+@pytest.mark.parametrize("kind", [IndexDataCacheFile, FilesByType])
+def test_processes_that_compile_at_once_do_not_swap_their_code(kind, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """What happens in numba's own files, which number code in the order it comes, shows why ours have other names."""
+    one, two = (kind(str(tmp_path), "kernel", "stamp") for _ in range(2))
+    for files in (one, two):  # both read the index before the other writes
+        monkeypatch.setattr(files, "_load_index", dict)
+    late = one._save_data
+    kept: list[tuple[str, Any]] = []
+    monkeypatch.setattr(one, "_save_data", lambda name, data: kept.append((name, data)))
+    one.save(("int8",), "code for int8")
+    two.save(("int16",), "code for int16")
+    for name, data in kept:  # the first was interrupted between its two files
+        late(name, data)
+    found = kind(str(tmp_path), "kernel", "stamp").load(("int16",))
+    assert found == ("code for int16" if kind is FilesByType else "code for int8")
+
+
+def test_kernels_use_these_files():
+    compiled = kernel(lambda values: values)
+    if hasattr(compiled, "_cache"):
+        assert type(compiled._cache._cache_file) is FilesByType
 
 
 @pytest.mark.slow
