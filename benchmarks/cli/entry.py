@@ -9,6 +9,9 @@ def run() -> None:
     """Run the command line and end the process with its exit code."""
     code: object = 130
     try:
+        from benchmarks.cli.interrupts import spare_imports
+
+        spare_imports()
         from benchmarks.cli.app import main
 
         main(prog_name="legible")

@@ -97,6 +97,37 @@ def test_ctrl_c_is_a_sentence_and_exit_code_130(command: str, delays: tuple[floa
         assert noise not in error
 
 
+LOADING = """
+import os, signal, sys, time
+from benchmarks.cli.interrupts import spare_imports
+spare_imports()
+try:
+    import loading  # interrupts itself
+    time.sleep(10)
+except KeyboardInterrupt:
+    print("interrupted", "loading" in sys.modules)
+"""
+MODULE = """
+import os, signal, time
+for press in range({presses}):
+    os.kill(os.getpid(), signal.SIGINT)
+    end = time.monotonic() + 0.2
+    while time.monotonic() < end:
+        pass
+"""
+
+
+@pytest.mark.parametrize(("presses", "code", "said"), [(1, 0, "interrupted True"), (2, 130, "")])
+def test_ctrl_c_waits_for_the_module_that_is_loaded(presses: int, code: int, said: str, folder: Path) -> None:
+    """Where it does not, compiled modules of other packages may abort the process."""
+    (folder / "loading.py").write_text(MODULE.format(presses=presses))
+    (folder / "program.py").write_text(LOADING)
+    done = subprocess.run([sys.executable, "program.py"], cwd=folder, capture_output=True, text=True, check=False,
+                          timeout=60, preexec_fn=_hear_ctrl_c)  # fmt: skip
+    assert (done.returncode, done.stdout.strip()) == (code, said), done.stderr
+    assert done.stderr == ("stopped\n" if code else "")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("command", "delay"), [("score", 0.3), ("show", 0.6), ("score", 1.2)])
 def test_ctrl_c_while_a_layout_is_scored(command: str, delay: float, folder: Path) -> None:
