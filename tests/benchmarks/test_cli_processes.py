@@ -189,6 +189,7 @@ def test_a_full_disk_is_an_error(folder: Path) -> None:
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.slow
 def test_output_may_be_closed(folder: Path) -> None:
     for redirected in (">&-", "2>&-", ">&- 2>&-"):
         line = f"{' '.join(PROGRAM)} score k.txt {redirected}"

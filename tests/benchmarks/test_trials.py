@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
+import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -168,6 +170,29 @@ def test_a_worker_that_dies_takes_only_its_cell_along(tmp_path: Path) -> None:
     table = run_trials(trial_functions.die_at_first, trials, tmp_path, workers=2)
     assert table["seed"].tolist() == [0, 1, 2, 3]
     assert marks_of(tmp_path) == ["0-0", "1-0", "1-1", "2-0", "3-0"]
+
+
+HARD_OF_HEARING = """
+import multiprocessing, signal
+from benchmarks.trials.local import _deaf_to_interrupts
+if __name__ == "__main__":
+    with _deaf_to_interrupts():
+        first = multiprocessing.get_context("spawn").Process(target=print)
+        first.start()
+        print(signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, []))
+    first.join()
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="there are no masks of signals")
+def test_the_first_worker_hears_no_ctrl_c_either(tmp_path: Path) -> None:
+    """The first process also starts Python's tracker of resources, which changes the mask."""
+    (tmp_path / "program.py").write_text(HARD_OF_HEARING)
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
+    done = subprocess.run(
+        [sys.executable, "program.py"], cwd=tmp_path, env=environment, capture_output=True, check=True
+    )
+    assert b"True" in done.stdout
 
 
 def test_results_under_a_former_name_are_found_and_new_ones_kept_under_the_new(tmp_path: Path) -> None:
