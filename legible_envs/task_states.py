@@ -102,13 +102,7 @@ class StateSpace:
 
     def ready(self, done: tuple[int, ...]) -> list[int]:
         """Classes of which a copy may be done next, by precedence and open groups."""
-        begun, unfinished = set(), set()
-        for cls, n in zip(self.classes, done, strict=True):
-            if n > 0:
-                begun.add(cls.group)
-            if n < cls.count:
-                unfinished.add(cls.group)
-        is_open = (begun & unfinished) - {None}
+        is_open = self._open_groups(done)
         full = self.max_open is not None and len(is_open) >= self.max_open
         return [
             i
