@@ -390,6 +390,16 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
     # -- the running game -------------------------------------------------------------------------------------------
 
     @property
+    def game(self) -> TableGame:
+        """The rules at work, and the table's whole state; to be read only."""
+        return self._game
+
+    @property
+    def team(self) -> Team:
+        """The robot and what it believes; to be read only."""
+        return self._team
+
+    @property
     def task(self) -> TabletopTask:
         """The task."""
         return self.settings.task

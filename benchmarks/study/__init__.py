@@ -1,0 +1,1 @@
+"""`legible study`: studies with participants in the browser, whose data go through the experiments' own analysis."""

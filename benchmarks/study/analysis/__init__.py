@@ -1,0 +1,1 @@
+"""Exports of a study, and its tables, figures and report."""

@@ -1,0 +1,1 @@
+"""A study as a folder: settings, texts, layouts and questionnaires, checked as a whole."""

@@ -1,0 +1,1 @@
+"""The server of a study: participants join, play and answer; researchers watch."""

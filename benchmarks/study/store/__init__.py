@@ -1,0 +1,1 @@
+"""The database of a study: a few plain tables, where an acknowledged row is on disk."""
