@@ -204,7 +204,7 @@ class Progress:
         if statements:
             await self.context.store.write(*statements)
 
-    async def log(self, kind: str, **detail: Any) -> None:
+    async def log(self, kind: str, /, **detail: Any) -> None:
         """Keep an event."""
         now = self.context.now()
         await self._write(
