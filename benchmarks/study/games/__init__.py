@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
     from benchmarks.study.design.study import Study
     from benchmarks.study.games.base import Game
     from benchmarks.study.timeline import Screen
 
-__all__ = ["make_game"]
+__all__ = ["make_game", "reaches_left"]
 
 
 def make_game(study: Study, screen: Screen, seed: int, *, reaches_left: int | None = None) -> Game:
@@ -56,3 +58,23 @@ def make_game(study: Study, screen: Screen, seed: int, *, reaches_left: int | No
         reaches=rules.reaches if reaches_left is None else reaches_left,
         **settings,
     )
+
+
+def reaches_left(study: Study, screen: Screen, earlier: Iterable[tuple[Screen, Mapping[str, Any]]]) -> int | None:
+    """How many reaches of a round's condition are still to be made; None where rounds alone count.
+
+    Args:
+        study: The design.
+        screen: A ``round``.
+        earlier: Finished rounds of the participant and their outcomes, in any order; those of other conditions and
+            sittings do not count.
+    """
+    wanted = study.content.rounds.reaches
+    if study.content.domain != "tabletop" or not wanted or screen.kind != "round":
+        return None
+    made = sum(
+        int(outcome.get("reaches", 0))
+        for other, outcome in earlier
+        if other.kind == "round" and (other.condition, other.sitting) == (screen.condition, screen.sitting)
+    )
+    return max(0, wanted - made)
