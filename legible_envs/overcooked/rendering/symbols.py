@@ -86,7 +86,7 @@ def game_symbols() -> dict[str, str]:
     Returns:
         ``k-chef-F`` (``F`` the facing: 0 N, 1 S, 2 E, 3 W) without hands, with ``k-hands-F`` empty and ``k-grip-F`` full
         hands, and ``k-wedge-F`` on the floor, all ``1 + CHEF_RISE`` tall; ``k-item-KIND`` for ingredients and the empty
-        dish, each of radius :data:`PART_RADIUS`; of pots ``k-flames-0``, ``k-flames-1``, ``k-steam-0``, ``k-steam-1``,
+        dish, each of radius :data:`PART_RADIUS`; of pots ``k-pot``, ``k-flames-0``, ``k-flames-1``, ``k-steam-0``, ``k-steam-1``,
         ``k-ready`` (a glow), ``k-gauge`` (empty) and ``k-gauge-full``; and ``k-tick``.
     """
     chefs: dict[str, SvgCanvas] = {}
@@ -106,6 +106,7 @@ def game_symbols() -> dict[str, str]:
     for phase in (0, 1):
         draw_flames(sheet(f"flames-{phase}"), phase)
         draw_steam(sheet(f"steam-{phase}"), phase)
+    draw_pot(sheet("pot"), PotView())
     draw_ready(sheet("ready"))
     draw_gauge(sheet("gauge"), 0.0, PALETTE["progress"])
     draw_gauge(sheet("gauge-full"), 1.0, PALETTE["ready"])
