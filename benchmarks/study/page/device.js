@@ -38,15 +38,15 @@ export function deviceScreen(screen, connection) {
     const width = innerWidth, height = innerHeight, kind = pointer();
     const fits = width >= needs.min_width && height >= needs.min_height;
     const numbers = { width, height, min_width: needs.min_width, min_height: needs.min_height };
-    const lines = [fits ? line("good", word("found_window", numbers)) : line("bad", word("device_too_small", numbers))];
+    const lines = [fits ? line("good", word("found_window", numbers)) : line("bad", word("device_size", numbers))];
     const isThere = needs.pointer === "any" || (needs.pointer === "fine" ? kind === "fine" : found.touched || navigator.maxTouchPoints > 0);
-    const lack = needs.pointer === "fine" ? "device_no_fine_pointer" : "device_no_touch";
+    const lack = needs.pointer === "fine" ? "device_pointer_fine" : "device_pointer_touch";
     if (kind !== "none" || needs.pointer !== "any") lines.push(isThere ? line("good", word("found_pointer")) : line("bad", word(lack)));
     if (needs.keyboard) lines.push(line(found.keyboard ? "good" : "open", word(found.keyboard ? "found_keyboard" : "device_press_key")));
     const trip = Math.round(found.round_trip), most = Math.round(needs.max_round_trip);
     const slow = most > 0 && trip > most;
     if (Number.isNaN(trip)) lines.push(line("open", word("device_checking")));
-    else lines.push(line(slow ? "bad" : "good", word(slow ? "device_too_slow" : "found_connection", { round_trip: trip, max_round_trip: most })));
+    else lines.push(line(slow ? "bad" : "good", word(slow ? "device_connection" : "found_connection", { round_trip: trip, max_round_trip: most })));
     list.replaceChildren(...lines);
     const isMeasured = !Number.isNaN(trip), waits = needs.keyboard && !found.keyboard;
     prompt.hidden = !(isMeasured && (waits || (fits && !slow && isThere)));
