@@ -51,9 +51,12 @@ export function announce(text) {
   if (text) setTimeout(() => { live.textContent = text; }, 30);
 }
 
-// A card with a heading, the usual shape of a screen.
+// A card: texts of the study bring their own heading, or `title` is one.
 export function card(title, ...children) {
-  return el("article", { class: "card" }, title && el("h1", { tabindex: "-1" }, title), ...children);
+  const element = el("article", { class: "card" }, ...children);
+  if (title && !element.querySelector("h1")) element.prepend(el("h1", {}, title));
+  element.querySelector("h1")?.setAttribute("tabindex", "-1");
+  return element;
 }
 
 // A question in front of everything else; resolves to whether it was answered by `yes`.

@@ -3,6 +3,7 @@ import { svg, word } from "./dom.js";
 import { mix, use } from "./sheet.js";
 
 const S = 100;  // a tile
+const SEAM = 0.6;  // by which one reaches under the next, so that nothing shows between them
 const AROUND = [[-1, 0], [0, 1], [1, 0], [0, -1], [-1, 1], [1, 1], [1, -1], [-1, -1]];
 const AWAY = [[1, 0], [-1, 0], [0, -1], [0, 1]];  // where the floor is, by the side opposite to it
 const STATIONS = "TOCFDPS";
@@ -34,14 +35,14 @@ export class KitchenBoard {
   cell(row, col) {
     const at = (dy, dx) => this.symbol(row + dy, col + dx);
     const solid = (dy, dx) => ![undefined, " ", "V"].includes(at(dy, dx));
-    const part = (name) => use(`k-${name}`, col * S, row * S, S);
+    const part = (name, side = S) => use(`k-${name}`, col * S, row * S, side);
     const symbol = at(0, 0), odd = (row + col) % 2;
     if (symbol === " " || symbol === "V") {
-      const floor = part(`floor-${solid(-1, 0) + 2 * solid(0, -1)}${odd}`);
+      const floor = part(`floor-${solid(-1, 0) + 2 * solid(0, -1)}${odd}`, S + SEAM);
       if (symbol === " ") return [floor];
-      return [floor, part("light"), ...AROUND.flatMap(([dy, dx], bit) => (at(dy, dx) === "V" ? [] : [part(`edge-${bit}`)]))];
+      return [floor, part("light", S + SEAM / 4), ...AROUND.flatMap(([dy, dx], bit) => (at(dy, dx) === "V" ? [] : [part(`edge-${bit}`)]))];
     }
-    const counter = part(`counter-${solid(1, 0) ? 0 : 1}${odd}`);
+    const counter = part(`counter-${solid(1, 0) ? 0 : 1}${odd}`, S + SEAM);
     if (!STATIONS.includes(symbol)) return [counter];
     const away = AWAY.findIndex(([dy, dx]) => [" ", "V"].includes(at(dy, dx)));
     return [counter, part(symbol === "S" ? `S-${Math.max(0, away)}` : symbol)];

@@ -45,7 +45,7 @@ export function play({ screen, connection, measures, stage, hud, panel, over }) 
 
   function ticket(soup, isDone) {
     const words = soup.map((kind) => word(`item_${kind}`)).join(", ");
-    const mark = isDone && svg("svg", { viewBox: "0 0 10 10", class: "tick", "aria-hidden": "true" }, use("k-tick", 0, 0, 10));
+    const mark = isDone && svg("svg", { viewBox: "0 0 10 10", class: "done-mark", "aria-hidden": "true" }, use("k-tick", 0, 0, 10));
     return el("li", { class: isDone ? "ticket done" : "ticket" }, board.icon([soup]), mark, el("span", { class: "visually-hidden" }, isDone ? `${words} ✓` : words));
   }
 

@@ -37,7 +37,7 @@ function place(next, { focus = true } = {}) {
   document.body.classList.toggle("playing", Boolean(next.isGame));
   main.replaceChildren(next.element);
   scrollTo(0, 0);
-  if (focus) (next.element.querySelector("[autofocus]") || next.element.querySelector("h1") || next.element).focus({ preventScroll: true });
+  if (focus) (next.element.querySelector("[data-first]") || next.element.querySelector("h1") || next.element).focus({ preventScroll: true });
 }
 
 function progress(share) {

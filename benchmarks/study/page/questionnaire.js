@@ -121,7 +121,7 @@ export function questionnaireScreen(screen, connection) {
     const values = Object.assign({}, ...questions.map((one) => one.read()));
     return connection.send({ type: "answers", values, seconds: (performance.now() - begun) / 1000 });
   });
-  const form = el("form", { novalidate: true, autocomplete: "off" }, ...questions.map((one) => one.box), problem, el("div", { class: "buttons" }, send));
+  const form = el("form", { novalidate: true, autocomplete: "off" }, problem, ...questions.map((one) => one.box), el("div", { class: "buttons" }, send));
   form.addEventListener("submit", (event) => event.preventDefault());
   return {
     element: card(screen.title, prose(screen.html), form),

@@ -1,5 +1,5 @@
 // A practice or a round: what is said before it begins, then the game with everything around it.
-import { announce, button, card, el, once, prose, study, word } from "./dom.js";
+import { announce, button, card, el, isCoarse, once, prose, study, word } from "./dom.js";
 import { load } from "./sheet.js";
 
 const isKitchen = study.domain === "overcooked";
@@ -25,19 +25,23 @@ function parts(screen) {
 }
 
 const heading = (screen) => word(screen.kind === "practice" ? "practice_heading" : "round_heading");
-const hints = (screen) => (isKitchen ? [keysHint(screen.keys)] : [word("pointer_hint"), word("table_keys_hint")]);
+// A device that is touched has no keys to speak of.
+const hints = (screen) => {
+  if (isKitchen) return isCoarse() ? [] : [keysHint(screen.keys)];
+  return [word("pointer_hint"), word(isCoarse() ? "touch_hint" : "table_keys_hint")];
+};
+const hintList = (screen) => hints(screen).length > 0 && el("ul", { class: "hints" }, ...hints(screen).map((text) => el("li", {}, text)));
 
 function before(screen, connection) {
   load(isKitchen ? "kitchen" : "table").catch(() => {});
-  const go = once(button(word("begin"), null, { class: "primary large", autofocus: true }), () => connection.send({ type: "next" }));
+  const go = once(button(word("begin"), null, { class: "primary large", "data-first": true }), () => connection.send({ type: "next" }));
   const isAgain = screen.kind === "practice" && screen.attempt > 1;
   return {
-    element: el("article", { class: "card" },
-      el("p", { class: "eyebrow" }, parts(screen).join(" · ") || heading(screen)),
-      el("h1", { tabindex: "-1" }, heading(screen)),
+    element: card(heading(screen),
+      parts(screen).length > 0 && el("p", { class: "eyebrow" }, parts(screen).join(" · ")),
       isAgain && el("p", { class: "notice", role: "alert" }, word("practice_again")),
       prose(screen.html),
-      el("ul", { class: "hints" }, ...hints(screen).map((text) => el("li", {}, text))),
+      hintList(screen),
       el("div", { class: "buttons" }, go)),
     again: () => go.removeAttribute("aria-disabled"),
     refused: () => go.removeAttribute("aria-disabled"),
@@ -45,8 +49,7 @@ function before(screen, connection) {
 }
 
 function instructions(screen) {
-  const dialog = el("dialog", { class: "dialog wide", "aria-label": word("show_instructions") }, prose(screen.html),
-    el("ul", { class: "hints" }, ...hints(screen).map((text) => el("li", {}, text))));
+  const dialog = el("dialog", { class: "dialog wide", "aria-label": word("show_instructions") }, prose(screen.html), hintList(screen) || "");
   dialog.append(el("div", { class: "buttons" }, button(word("back"), () => dialog.close(), { class: "primary" })));
   dialog.addEventListener("close", () => dialog.remove());
   document.body.append(dialog);
@@ -57,7 +60,7 @@ function playing(screen, connection) {
   const stage = el("div", { class: "stage" }), hud = el("div", { class: "hud" }), panel = el("div", { class: "panel" });
   const toast = el("p", { class: "toast", role: "status", hidden: true });
   const foot = el("div", { class: "foot" },
-    el("span", {}, [heading(screen), ...parts(screen)].join(" · ")),
+    el("span", {}, parts(screen).join(" · ") || heading(screen)),
     button(word("show_instructions"), () => instructions(screen), { class: "quiet" }));
   const element = el("section", { class: `game ${isKitchen ? "kitchen" : "table"}`, "aria-label": heading(screen) }, hud, stage, panel, foot, toast);
   let play = null, latest = screen, isClosed = false;

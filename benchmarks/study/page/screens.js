@@ -16,16 +16,16 @@ export function welcome(join, problem = "") {
     }
     go.removeAttribute("aria-disabled");
   });
-  return { element: el("article", { class: "card" }, prose(study.welcome), error, el("div", { class: "buttons" }, go)) };
+  return { element: card("", prose(study.welcome), error, el("div", { class: "buttons" }, go)) };
 }
 
 // A text instead of a study: why nobody can join now.
-export const told = (html) => ({ element: el("article", { class: "card", tabindex: "-1" }, prose(html)) });
+export const told = (html) => ({ element: card("", prose(html)) });
 export const notice = (text) => ({ element: el("article", { class: "card centred", tabindex: "-1" }, el("p", { class: "large" }, text)) });
 
 export function text(screen, connection) {
   const go = once(button(word("continue"), null, { class: "primary" }), () => connection.send({ type: "next" }));
-  return { element: el("article", { class: "card", tabindex: "-1" }, prose(screen.html), el("div", { class: "buttons" }, go)), again: () => {} };
+  return { element: card("", prose(screen.html), el("div", { class: "buttons" }, go)), again: () => {} };
 }
 
 export function consent(screen, connection) {
@@ -56,7 +56,7 @@ export function pause(screen, connection) {
   look();
   const timer = setInterval(look, 1000);
   return {
-    element: el("article", { class: "card", tabindex: "-1" }, prose(screen.html), state, until, el("div", { class: "buttons" }, go)),
+    element: card("", prose(screen.html), state, until, el("div", { class: "buttons" }, go)),
     again: () => {},
     refused: () => { go.removeAttribute("aria-disabled"); },
     close: () => clearInterval(timer),
@@ -94,10 +94,9 @@ function codeBox(code) {
 const AWAY = 8000;
 
 export function end(screen) {
-  const url = address(screen.url), element = card(word("end_heading"));
+  const url = address(screen.url), element = card(word("end_heading"), prose(screen.html));
   let timer = 0;
   if (screen.failed?.length) element.append(el("ul", { class: "failed" }, ...screen.failed.map((reason) => el("li", {}, reason))));
-  element.append(prose(screen.html));
   if (url) {
     element.append(el("div", { class: "buttons" }, el("a", { class: "button primary", href: url.href, rel: "noopener noreferrer" }, word("go_back", { host: url.host }))));
     // A page in a frame is left by its button alone: the frame is somebody else's.

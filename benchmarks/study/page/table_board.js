@@ -22,7 +22,7 @@ export class TableBoard {
     this.top = svg("svg", { ...box, class: "layer moving" });
     this.surface(scene.layout, table);
     this.objects = scene.layout.objects.map((object) => this.object(object));
-    this.layers = Object.fromEntries(["lying", "marks", "robot", "hand", "belief", "pointer"].map((name) => [name, svg("g", { class: name })]));
+    this.layers = Object.fromEntries(["lying", "marks", "robot", "start", "hand", "belief", "pointer"].map((name) => [name, svg("g", { class: name })]));
     this.top.append(...Object.values(this.layers));
     this.actors(table);
   }
@@ -110,7 +110,8 @@ export class TableBoard {
     this.goal = svg("circle", { class: "goal", visibility: "hidden" });
     this.target = svg("circle", { fill: "none", stroke: this.colours.robot, "stroke-width": 4.5, visibility: "hidden" });
     this.layers.marks.append(this.goal, this.target);
-    this.layers.pointer.append(this.halo, this.ring);
+    this.layers.start.append(this.halo);
+    this.layers.pointer.append(this.ring);
   }
 
   move(group, x, y, angle = 0) {

@@ -1,5 +1,5 @@
 // Plays a table: the pointer is the hand. Sampled every frame, sent in batches; the server moves what there is to move.
-import { announce, el, word } from "./dom.js";
+import { announce, el, isCoarse, word } from "./dom.js";
 import { Motion } from "./motion.js";
 import { TableBoard } from "./table_board.js";
 
@@ -143,7 +143,7 @@ export function play({ screen, connection, measures, stage, hud, panel, over }) 
   function tell() {
     const total = scene.wanted || Object.keys(scene.slots).length, n = scene.wanted ? state.reaches : state.done;
     status.textContent = total ? word("placed", { n, total }) : word("placed_open", { n });
-    hint.textContent = isRunning ? board.describe(state) : word("take_pointer");
+    hint.textContent = isRunning ? board.describe(state) : word(isCoarse() ? "take_finger" : "take_pointer");
   }
 
   function look(now) {
