@@ -127,15 +127,15 @@ class Session(Progress):
             self.play.start_clock(now)
         if self.play is None:
             return
-        if not is_same_page and limits.resume == "block":
+        if self.play.game.is_over:
+            await self._game_over(self.play)
+        elif not is_same_page and limits.resume == "block":
             await self._end("blocked")
         elif not is_same_page and limits.resume == "restart":
             outcome = {**self.play.game.outcome(), "restarted": True}
             await self._write(rows.finish_visit(self.visit, now, outcome))
             self._forget_game()
             self.attempt += screen.kind == "round"  # who reloads in the practice loses no attempt
-        elif self.play.game.is_over:
-            await self._game_over(self.play)
 
     async def handle(self, message: p.Message) -> list[dict[str, Any]]:
         """Do what a message asks for.
@@ -154,7 +154,7 @@ class Session(Progress):
                 await self._write(*self._sign_of_life(self.context.now(), _SEEN_IDLE))
                 return [{"type": "pong", "at": message.at}]
             if isinstance(message, p.Event):
-                await self.log(f"page_{message.kind}", at=message.at, detail=message.detail)
+                await self.log(f"page_{message.kind}", page_time=message.at, detail=message.detail)
                 return []
             screen = self.screen
             if screen is None:  # the end, or something could not be stored just before it
