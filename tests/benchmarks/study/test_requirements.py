@@ -6,6 +6,7 @@ import contextlib
 import hashlib
 import json
 import sqlite3
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -178,6 +179,8 @@ def test_connects_disconnects_focus_blur_and_visibility_are_rows(tmp_path: Path)
                 page.send("event", kind=kind, at=5)
             page.say("ping", at=1)
         expected = ["joined", "connect", "page_focus", "page_blur", "page_hidden", "page_visible", "page_resize"]
+        while "disconnect" not in server.kinds():
+            time.sleep(0.01)
         assert server.kinds() == [*expected, "page_fullscreen", "disconnect"]
 
 
@@ -216,7 +219,10 @@ def test_codes_are_a_participants_own_and_can_be_verified_later(tmp_path: Path) 
 @pytest.mark.parametrize(
     ("deleted", "screen"),
     [
-        ("DELETE FROM steps WHERE step = 5 AND visit = (SELECT visit FROM visits WHERE name = 'round#A#1')", "round#A#1"),
+        (
+            "DELETE FROM steps WHERE step = 5 AND visit = (SELECT visit FROM visits WHERE name = 'round#A#1')",
+            "round#A#1",
+        ),
         ("DELETE FROM steps WHERE step = 13", "round#A#1"),
         ("DELETE FROM answers WHERE item = 'easy'", "study#asked"),
         ("DELETE FROM answers WHERE item = 'consent'", "consent"),
@@ -413,7 +419,9 @@ def test_worker_ids_are_in_one_table(tmp_path: Path) -> None:
         with server.page(server.join(PROLIFIC_PID="secret-worker", STUDY_ID="st", SESSION_ID="se")) as page:
             page.finish()
         tables = [row[0] for row in server.rows("SELECT name FROM sqlite_master WHERE type = 'table'")]
-        found = [name for name in tables if "secret-worker" in str([tuple(r) for r in server.rows(f"SELECT * FROM {name}")])]
+        found = [
+            name for name in tables if "secret-worker" in str([tuple(r) for r in server.rows(f"SELECT * FROM {name}")])
+        ]
         assert found == ["workers"]
 
 
