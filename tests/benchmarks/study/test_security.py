@@ -115,11 +115,12 @@ def test_hostile_values_of_every_field_are_answered_politely(tmp_path: Path, val
         if isinstance(value, str):
             text = server.client.get("/", params={"PROLIFIC_PID": value.encode("utf-8", "replace")}).text
             assert "<script>alert" not in text
-        with server.page(server.join(PROLIFIC_PID="w")) as page:
+        token = server.join(PROLIFIC_PID="w")
+        with server.page(token) as page:  # some twenty messages that are not understood end a connection
             _send_everywhere(page, value)
             page.agree()
-            assert page.name == "round#A#1"
             page.say("next")
+        with server.page(token) as page:
             _send_everywhere(page, value)
             page.play(WAY)
             assert page.finish()["ending"] == "complete"
@@ -140,8 +141,6 @@ def _send_everywhere(page: Page, value: Any) -> None:
             message = json.dumps({"type": kind, **good, name: value})
             if len(message) < 60_000:
                 page.socket.send_text(message)
-            if kind == "step" and name == "n" and value == 0:
-                continue
     page.send("ping", at=123)
     while page.read().get("at") != 123:
         pass
