@@ -91,7 +91,7 @@ def test_it_says_how_participants_are_doing(tmp_path: Path) -> None:
         assert "secret-study" not in answer.text
         third, second, first = found["participants"]
         assert [person["state"] for person in (first, second, third)] == ["complete", "withdrawn", "active"]
-        assert (third["name"], third["steps"], third["screens"]) == ("round#A#1", 4, 6)
+        assert (third["name"], third["steps"], third["screens"]) == (f"round#{third['conditions'][0]}#1", 4, 6)
         assert (third["connected"], third["idle"], first["connected"]) == (True, 12.0, False)
         assert (first["attention"], third["attention"]) == ([0, 1], [0, 0])
         assert (found["complete"], found["wanted"], found["recruitment"]) == (1, 3, "open")
