@@ -62,7 +62,8 @@ def serve(
     participants are doing; keep that link to yourself), and serves until Ctrl-C.
     """
     from benchmarks.study.design.study import check_study, load_study
-    from benchmarks.study.server.run import Address, serve as serve_study
+    from benchmarks.study.server.run import Address
+    from benchmarks.study.server.run import serve as serve_study
     from benchmarks.study.store import Mode
 
     if problems := [problem for problem in check_study(folder) if problem.is_error]:

@@ -12,9 +12,9 @@ from starlette.testclient import TestClient, WebSocketTestSession
 
 from benchmarks.study.design.models import StudyContent
 from benchmarks.study.design.package_files import default_words
-from benchmarks.study.design.text_names import known_texts
 from benchmarks.study.design.questionnaires import Questionnaire
 from benchmarks.study.design.study import Study
+from benchmarks.study.design.text_names import known_texts
 from benchmarks.study.server.app import create_app
 from benchmarks.study.server.context import Pace
 from benchmarks.study.store import database_path

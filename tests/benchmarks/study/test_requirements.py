@@ -133,7 +133,7 @@ def test_a_session_can_be_resumed_up_to_a_maximum_age(tmp_path: Path) -> None:
 
 
 def test_the_newest_tab_wins_and_the_older_is_told(tmp_path: Path) -> None:
-    with served(tiny_study(tmp_path)) as server, in_round(server, tab="old") as (token, old):
+    with served(tiny_study(tmp_path)) as server, in_round(server, tab="old") as (token, old):  # noqa: SIM117
         with server.page(token, tab="new") as new:
             assert new.state == old.state
             assert old.read() == {"type": "replaced"}

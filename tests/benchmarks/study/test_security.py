@@ -202,14 +202,14 @@ def test_any_json_leaves_the_game_as_it_was_unless_it_is_acknowledged(tmp_path: 
 def test_floods_are_cut_off_and_leave_few_rows(tmp_path: Path) -> None:
     with served(tiny_study(tmp_path), messages=1, burst=50, event_burst=10, events=0.01) as server:
         token = server.join()
-        with server.page(token) as page, pytest.raises(WebSocketDisconnect) as ending:
+        with server.page(token) as page, pytest.raises(WebSocketDisconnect) as ending:  # noqa: PT012
             for _ in range(60):
                 page.send("event", kind="focus", at=1)
             while True:
                 page.read()
         assert ending.value.code == 4429
         assert server.kinds().count("page_focus") == 10
-        with server.page(token) as page, pytest.raises(WebSocketDisconnect) as ending:
+        with server.page(token) as page, pytest.raises(WebSocketDisconnect) as ending:  # noqa: PT012
             for _ in range(30):
                 page.say("nonsense")
         assert ending.value.code == 4400
@@ -263,6 +263,6 @@ def test_secrets_are_in_no_log_and_no_database(tmp_path: Path, caplog: pytest.Lo
 
 def test_what_is_wrong_with_a_message_is_said_without_the_message() -> None:
     for text in ('{"type":"hello","token":"SECRET"}', '{"type":"hello","token":"SECRET","tab":5}', '{"SECRET'):
-        with pytest.raises(ValueError, match=".") as problem:
+        with pytest.raises(ValueError, match=r".") as problem:
             protocol.read_message(text)
         assert "SECRET" not in str(problem.value)

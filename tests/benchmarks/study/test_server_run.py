@@ -41,7 +41,7 @@ def test_designs_are_mixed_only_where_somebody_says_so(tmp_path: Path) -> None:
 
 
 def test_a_port_that_is_taken_is_said_in_a_sentence() -> None:
-    with (
+    with (  # noqa: SIM117
         listening(Address(port=0)) as listener,
         pytest.raises(StudyError, match=r"port \d+ of 127.0.0.1 cannot be used"),
     ):
