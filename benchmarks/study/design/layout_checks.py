@@ -220,10 +220,11 @@ def _check_table_predictor(draft: Draft, name: str, *path: str) -> None:
 
 
 def _check_unused(draft: Draft) -> None:
-    place = draft.folder / "layouts"
+    place, practice = draft.folder / "layouts", draft.content.practice
+    used = {entry.layout for entry in draft.content.conditions} | ({practice.layout} if practice is not None else set())
     if not place.is_dir() or not place.resolve().is_relative_to(draft.folder.resolve()):
         return
     for entry in sorted(place.iterdir()):
         name = f"layouts/{entry.name}"
-        if entry.is_file() and not entry.name.startswith(".") and entry.suffix != ".md" and name not in draft.layouts:
+        if entry.is_file() and not entry.name.startswith(".") and entry.suffix != ".md" and name not in used:
             draft.refuse_file(name, f"nothing in {SETTINGS} uses this file", warn=True)

@@ -40,12 +40,13 @@ def _read_settings(folder: Path) -> tuple[str, StudyContent]:
     if wrong is not None:
         raise _error(folder, [Problem(SETTINGS, f"{wrong}; expected the settings of a study")])
     try:
-        source = read_bounded(folder / SETTINGS, SETTINGS)
+        source = read_bounded(folder / SETTINGS)
         data = parse_toml(source)
     except ValueError as error:
         raise _error(folder, [Problem(SETTINGS, str(error), line=_line_in(str(error)))]) from error
     if found := problems_of(StudyContent, data, SETTINGS):
-        raise _error(folder, [problem_at(SETTINGS, source, path, message) for path, message in found])
+        problems = [problem_at(SETTINGS, source, path, message) for path, message in found]
+        raise _error(folder, sorted(problems, key=lambda problem: problem.line))
     return source, validated(StudyContent, data, SETTINGS)
 
 
