@@ -78,10 +78,12 @@ def _read_texts(draft: Draft) -> None:
 
 
 def _read_words(draft: Draft) -> None:
+    """The words of the study; in English, those of the package for what it does not say."""
     file = f"{draft.content.texts}/words.toml"
-    if is_english(draft.content) and not (draft.folder / file).exists():
-        draft.words = default_words()
-        return
+    if is_english(draft.content):
+        draft.words = dict(default_words())
+        if not (draft.folder / file).exists():
+            return
     source = draft.read(file, "the short texts of the page")
     if source is None:
         return

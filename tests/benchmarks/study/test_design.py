@@ -451,7 +451,6 @@ def test_texts_that_nobody_translated_are_named(kitchens):
 @pytest.mark.parametrize(
     ("old", "new", "key", "message"),
     [
-        ('begin = "Begin"', "", "begin", "`begin` is missing"),
         ('begin = "Begin"', 'begin = "Begin"\nbegn = "x"', "begn", "did you mean `begin`?"),
         ('begin = "Begin"', "begin = 3", "begin", "must be a text, got 3"),
         ('begin = "Begin"', 'begin = " "', "begin", "must be a text of 1 to"),
@@ -466,10 +465,15 @@ def test_words_are_complete_and_known_and_hold_their_values(kitchens, old, new, 
 
 
 def test_english_words_may_be_left_to_the_package_others_not(kitchens):
+    (kitchens / "texts/words.toml").write_text('begin = "Start"\n')
+    assert load_study(kitchens).words == {**default_words(), "begin": "Start"}
     (kitchens / "texts/words.toml").unlink()
-    assert check_study(kitchens) == []
+    assert load_study(kitchens).words == default_words()
     edit(kitchens, 'language = "en"', 'language = "pt-BR"')
     assert any(problem.file == "texts/words.toml" and problem.is_error for problem in check_study(kitchens))
+    (kitchens / "texts/words.toml").write_text('begin = "Começar"\n')
+    missing = {problem.key for problem in check_study(kitchens) if "is missing; in English it is" in problem.message}
+    assert missing == default_words().keys() - {"begin"}
 
 
 def test_a_questionnaire_of_ones_own_replaces_that_of_the_package_and_is_checked(kitchens):
