@@ -61,7 +61,7 @@ def page_of(name: str, data: Mapping[str, Any], **values: Any) -> str:
     from markupsafe import Markup
 
     text = json.dumps(data, allow_nan=False).replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
-    return str(_template(name).render(study_json=Markup(text), **values))
+    return str(_template(name).render(study_json=Markup(text), data=data, **values))
 
 
 def participant_page(context: Context, *, reason: str = "") -> str:

@@ -11,7 +11,8 @@
 ``pointer``    Tables: ``n`` (as in the last state that the page had), ``samples`` ``[[t, x, y], ...]``: milliseconds
                since the round began, metres on the table
 ``answers``    On a questionnaire: ``values`` by name of item, ``seconds`` it took
-``event``      ``kind`` (``focus, blur, visible, hidden, resize, fullscreen, error``), ``at``, ``detail`` (a text)
+``event``      ``kind`` (``focus, blur, visible, hidden, resize, fullscreen, active, error``), ``at``, ``detail`` (a
+               text). ``active``, now and then: they read or fill in; a sign of life, as the others are not
 ``ping``       ``at``; answered by ``pong`` with the same
 ``withdraw``   The participant does not want to go on
 =============  ========================================================================================================
@@ -130,7 +131,7 @@ class Event(_Message):
     """What happened to the page."""
 
     type: Literal["event"]
-    kind: Literal["focus", "blur", "visible", "hidden", "resize", "fullscreen", "error"]
+    kind: Literal["focus", "blur", "visible", "hidden", "resize", "fullscreen", "active", "error"]
     at: Finite = 0
     detail: Annotated[str, Field(max_length=1000)] = ""
 

@@ -212,7 +212,7 @@ class Session:
             if isinstance(message, p.Ping):
                 return [{"type": "pong", "at": message.at}]
             if isinstance(message, p.Event):
-                detail = {"at": message.at, "detail": message.detail}
+                detail = {"page_time": message.at, "detail": message.detail}
                 await self.log(f"page_{message.kind}", **detail)
                 return []
             if self.state != "active":

@@ -110,7 +110,7 @@ async def _replies(session: Session, connection: Connection, text: str) -> list[
     except ValueError as error:
         await session.log("bad_message", reason=str(error)[:500])
         return [{"type": "refused", "reason": "this message was not understood"}]
-    if not isinstance(message, p.Ping | p.Event):
+    if not isinstance(message, p.Ping | p.Event) or (isinstance(message, p.Event) and message.kind == "active"):
         connection.heard = session.context.now()
     try:
         return await session.handle(message)
