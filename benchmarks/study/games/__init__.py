@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
     from benchmarks.study.design.study import Study
     from benchmarks.study.games.base import Game
     from benchmarks.study.timeline import Screen
 
-__all__ = ["make_game"]
+__all__ = ["make_game", "reaches_left"]
 
 
 def make_game(study: Study, screen: Screen, seed: int, *, reaches_left: int | None = None) -> Game:
@@ -56,3 +58,23 @@ def make_game(study: Study, screen: Screen, seed: int, *, reaches_left: int | No
         reaches=rules.reaches if reaches_left is None else reaches_left,
         **settings,
     )
+
+
+def reaches_left(study: Study, screen: Screen, earlier: Iterable[Mapping[str, Any]]) -> int | None:
+    """How many reaches a participant still has to make in a condition, for :func:`make_game`.
+
+    The server and every replay count alike: what the rounds before this one came to, in the same sitting.
+
+    Args:
+        study: The design.
+        screen: A ``practice`` or ``round``.
+        earlier: Outcomes of the condition's earlier rounds in the same sitting that were finished, one of each.
+
+    Returns:
+        None where reaches do not count: in kitchens, in the practice, and where the design wants whole tasks. With 0
+        the condition is done, and the round is not played.
+    """
+    wanted = study.content.rounds.reaches
+    if screen.kind != "round" or study.content.domain != "tabletop" or not wanted:
+        return None
+    return max(0, wanted - sum(int(outcome.get("reaches", 0)) for outcome in earlier))
