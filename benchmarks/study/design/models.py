@@ -11,6 +11,7 @@ from legible_envs.overcooked.drawings import INGREDIENTS
 from legible_envs.support.models import Choice, FileModel, Flag, Length, Real, Text, Whole
 
 __all__ = [
+    "SCHEMA",
     "ConditionEntry",
     "DeviceEntry",
     "KitchenEntry",
@@ -22,7 +23,6 @@ __all__ = [
     "QuestionnaireUse",
     "RecruitmentEntry",
     "RoundsEntry",
-    "SCHEMA",
     "SittingEntry",
     "StudyContent",
     "TableEntry",

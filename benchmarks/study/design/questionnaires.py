@@ -73,7 +73,9 @@ def answered_names(questionnaire: Questionnaire) -> list[str]:
     return [
         name
         for item in questionnaire.items
-        for name in ([f"{item.name}/{n}" for n in range(1, len(item.rows) + 1)] if item.kind == "matrix" else [item.name])
+        for name in (
+            [f"{item.name}/{n}" for n in range(1, len(item.rows) + 1)] if item.kind == "matrix" else [item.name]
+        )
     ]
 
 

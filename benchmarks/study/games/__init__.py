@@ -60,21 +60,21 @@ def make_game(study: Study, screen: Screen, seed: int, *, reaches_left: int | No
     )
 
 
-def reaches_left(study: Study, screen: Screen, earlier: Iterable[Mapping[str, Any]]) -> int | None:
-    """How many reaches a participant still has to make in a condition, for :func:`make_game`.
-
-    The server and every replay count alike: what the rounds before this one came to, in the same sitting.
+def reaches_left(study: Study, screen: Screen, earlier: Iterable[tuple[Screen, Mapping[str, Any]]]) -> int | None:
+    """How many reaches of a round's condition are still to be made; None where rounds alone count.
 
     Args:
         study: The design.
-        screen: A ``practice`` or ``round``.
-        earlier: Outcomes of the condition's earlier rounds in the same sitting that were finished, one of each.
-
-    Returns:
-        None where reaches do not count: in kitchens, in the practice, and where the design wants whole tasks. With 0
-        the condition is done, and the round is not played.
+        screen: A ``round``.
+        earlier: Finished rounds of the participant and their outcomes, in any order; those of other conditions and
+            sittings do not count.
     """
     wanted = study.content.rounds.reaches
-    if screen.kind != "round" or study.content.domain != "tabletop" or not wanted:
+    if study.content.domain != "tabletop" or not wanted or screen.kind != "round":
         return None
-    return max(0, wanted - sum(int(outcome.get("reaches", 0)) for outcome in earlier))
+    made = sum(
+        int(outcome.get("reaches", 0))
+        for other, outcome in earlier
+        if other.kind == "round" and (other.condition, other.sitting) == (screen.condition, screen.sitting)
+    )
+    return max(0, wanted - made)

@@ -140,9 +140,7 @@ class KitchenGame:
         if seconds is None:
             return found
         ticks = np.asarray(seconds, dtype=np.float64)
-        return [
-            dataclasses.replace(each, times=ticks[np.rint(each.times / 0.15).astype(np.int64)]) for each in found
-        ]
+        return [dataclasses.replace(each, times=ticks[np.rint(each.times / 0.15).astype(np.int64)]) for each in found]
 
     def close(self) -> None:
         """Let go of the environment."""

@@ -1,0 +1,82 @@
+"""What the page is told to show."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from benchmarks.study.timeline import GAMES
+
+if TYPE_CHECKING:
+    from benchmarks.study.server.session import Session
+    from benchmarks.study.timeline import Screen
+
+__all__ = ["describe"]
+
+
+def describe(session: Session) -> dict[str, Any]:
+    """The message ``screen`` of a session; see :mod:`benchmarks.study.server.protocol`."""
+    context, screen = session.context, session.screen
+    if screen is None:
+        return _end(session)
+    found: dict[str, Any] = {
+        "type": "screen",
+        "name": screen.name,
+        "kind": screen.kind,
+        "progress": round(session.index / max(1, len(session.screens)), 3),
+        "html": context.text(screen.text) if screen.text else "",
+    }
+    if screen.kind == "device":
+        found["needs"] = context.study.content.device.model_dump()
+    elif screen.kind in GAMES:
+        found |= _game(session, screen)
+    elif screen.kind == "questionnaire":
+        asked = context.study.questionnaires[screen.questionnaire]
+        # Which answer of an attention check is right is not the page's business.
+        items = [item.model_dump(exclude={"expected", "scale", "reverse"}) for item in asked.items]
+        found |= {"title": asked.title, "html": context.html(asked.text), "items": items, "errors": {}}
+    elif screen.kind == "pause":
+        opens, closes = session.gap()
+        found |= {"from": opens, "until": closes}
+    return found
+
+
+def _game(session: Session, screen: Screen) -> dict[str, Any]:
+    content, game = session.context.study.content, session.game
+    conditions = list(
+        dict.fromkeys(s.condition for s in session.screens if s.kind == "round" and s.sitting == screen.sitting)
+    )
+    practice = content.practice
+    found: dict[str, Any] = {
+        "begun": game is not None,
+        "attempt": session.attempt,
+        "attempts": practice.attempts if screen.kind == "practice" and practice is not None else 0,
+        "round": screen.round,
+        "rounds": content.rounds.per_condition,
+        "condition_number": conditions.index(screen.condition) + 1 if screen.condition in conditions else 0,
+        "conditions": len(conditions),
+    }
+    if content.domain == "overcooked":
+        found |= {"waiting": content.kitchen.waiting, "keys": content.look.keys}
+    if game is not None:
+        found |= {"scene": game.scene(), "state": game.state(content.look.show_belief)}
+        if content.domain == "tabletop":
+            found["clock"] = game.steps * 1000.0 / 30
+    return found
+
+
+def _end(session: Session) -> dict[str, Any]:
+    context, ending = session.context, session.state
+    recruitment = context.study.content.recruitment
+    is_live = context.store.mode == "live"
+    code = recruitment.codes.get(ending) or context.secrets.code(session.participant, ending)
+    url = recruitment.completion_url.replace("{code}", code).replace("{ending}", ending)
+    return {
+        "type": "screen",
+        "name": ending,
+        "kind": "end",
+        "progress": 1.0 if ending == "complete" else round(session.index / max(1, len(session.screens)), 3),
+        "html": context.text(ending),
+        "ending": ending,
+        "code": code,
+        "url": url.replace("{participant}", session.participant) if is_live else "",
+    }
