@@ -155,12 +155,11 @@ class Recorder:
             row = {"participant": name, "source": "prolific", "worker": worker, "study": "S", "session": "X"}
             self._insert("workers", row | {"joined": now})
         self.event(name, now, "connected")
-        finished: dict[tuple[int, str], list[dict[str, Any]]] = {}
+        finished: list[tuple[Screen, dict[str, Any]]] = []
         walker = person_of(study, number, self.people)
         for index, screen in enumerate(screens[:done]):
             rng = np.random.default_rng((number, index))
-            key = (screen.sitting, screen.condition)
-            left = reaches_left(study, screen, finished.get(key, []))
+            left = reaches_left(study, screen, finished)
             if left == 0:
                 continue
             now += 60
@@ -168,7 +167,7 @@ class Recorder:
             outcome: dict[str, Any] = {}
             if screen.kind in GAMES:
                 outcome, now = self._play(name, visit, screen, walker, rng, now, left)
-                finished.setdefault(key, []).append(outcome)
+                finished.append((screen, outcome))
             elif screen.kind == "questionnaire":
                 self._answer(name, visit, screen, rng, now)
             done_at = {"finished": now, "outcome": json.dumps(outcome)}
@@ -264,7 +263,23 @@ def player_of(study: Study, env: Any, person: Any, rng: np.random.Generator) -> 
         return WalkingPlayer(env, person, rng)
     from legible_envs.tabletop.policies import ReachingPlayer
 
-    return ReachingPlayer(env, person, rng)
+    return ReachingPlayer(SilentTable(env), person, rng)  # type: ignore[arg-type]
+
+
+class SilentTable:
+    """A table to which no player tells its goal: participants cannot either, and a replay would not know."""
+
+    def __init__(self, env: Any) -> None:
+        self._env = env.unwrapped
+        self.goal: str | None = None
+
+    @property
+    def unwrapped(self) -> SilentTable:
+        """Itself."""
+        return self
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._env, name)
 
 
 def _any_answer(item: Any, condition: str, rng: np.random.Generator) -> Any:

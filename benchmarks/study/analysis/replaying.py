@@ -93,23 +93,21 @@ def begin(study: Study, person: PersonRow, visits: Sequence[VisitRow], visit: Vi
     if screen.kind not in GAMES:
         raise ReplayError(f"{screen.name!r} is no game")
     try:
-        left = reaches_left(study, screen, _earlier(visits, visit))
+        left = reaches_left(study, screen, _earlier(study, person, visits, visit))
         return make_game(study, screen, visit.seed, reaches_left=left)
     except (KeyError, TypeError, ValueError, OSError) as error:
         raise ReplayError(f"the game cannot be made: {error}") from error
 
 
-def _earlier(visits: Sequence[VisitRow], visit: VisitRow) -> list[dict[str, Any]]:
-    """Outcomes of the condition's earlier rounds in the same sitting: the last that was finished of each."""
-    of_round = {
-        each.round: each.result
+def _earlier(
+    study: Study, person: PersonRow, visits: Sequence[VisitRow], visit: VisitRow
+) -> list[tuple[Screen, dict[str, Any]]]:
+    """The rounds that were finished when a visit began, and what they came to."""
+    return [
+        (screen_of(study, person, each), each.result)
         for each in visits
-        if each.kind == "round"
-        and each.finished is not None
-        and (each.sitting, each.condition) == (visit.sitting, visit.condition)
-        and each.round < visit.round
-    }
-    return list(of_round.values())
+        if each.kind == "round" and each.finished is not None and each.visit < visit.visit
+    ]
 
 
 def play(game: Game, steps: Iterable[StepRow]) -> Iterator[tuple[StepRow, str]]:
@@ -202,6 +200,7 @@ def compare(
         if visit.finished is None:
             return count, []
         ours, stored = json.loads(json.dumps(game.outcome())), visit.result
+        stored.pop("restarted", None)  # the server's note that the participant began the round again
         other = [key for key in {**ours, **stored} if ours.get(key) != stored.get(key)]
         if other:
             told = ", ".join(f"{key} is {ours.get(key)!r}, recorded was {stored.get(key)!r}" for key in sorted(other))
