@@ -182,7 +182,7 @@ def steps_of(connection: sqlite3.Connection, visit: int) -> Iterator[StepRow]:
 def answers_of(connection: sqlite3.Connection, participant: str) -> list[Answer]:
     """A participant's answers, in order."""
     columns = ", ".join(Answer.__slots__)
-    found = connection.execute(f"SELECT {columns} FROM answers WHERE participant = ? ORDER BY visit, rowid", (participant,))
+    found = connection.execute(f"SELECT {columns} FROM answers WHERE participant = ? ORDER BY visit, item", (participant,))
     return [Answer(*row) for row in found]
 
 
