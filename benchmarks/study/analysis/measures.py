@@ -131,6 +131,8 @@ def compare_family(table: pd.DataFrame, conditions: Sequence[str], *, alpha: flo
         own = part.groupby(["participant", "condition"], sort=False)["value"].mean().reset_index()
         own = own.iloc[np.argsort([list(conditions).index(name) for name in own["condition"]], kind="stable")]
         means += [{"measure": measure, **row} for row in mean_rows(own, "condition", "value", alpha)]
+        if own["participant"].nunique() > 1 and np.ptp(own["value"].to_numpy(dtype=np.float64)) == 0:
+            continue  # the same for everybody everywhere: there is nothing to test
         try:
             found = compare(own, "value", alpha=alpha).overall
         except ValueError as error:

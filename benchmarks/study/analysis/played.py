@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from benchmarks.study.games.base import Game
     from legible_envs.rollouts.trajectory import Trajectory
 
-__all__ = ["IDLE_SECONDS", "IDLE_SPEED", "PlayedVisit", "key_times", "played", "setting_name"]
+__all__ = ["IDLE_SECONDS", "IDLE_SPEED", "PlayedVisit", "key_times", "named", "played", "setting_name"]
 
 IDLE_SECONDS: Final = 1.0
 """Kitchens: pauses between keys longer than this are idle time."""
@@ -84,12 +84,13 @@ def played(
             found = game.trajectories(
                 participant=person.participant, condition=visit.condition, seconds=seconds if is_kitchen else None
             )
-        return PlayedVisit(visit, seconds, _named(found, setting_name(study, visit.condition, visit.sitting)), outcome)
+        return PlayedVisit(visit, seconds, named(found, setting_name(study, visit.condition, visit.sitting)), outcome)
     finally:
         game.close()
 
 
-def _named(trajectories: list[Trajectory], layout_name: str) -> list[Trajectory]:
+def named(trajectories: list[Trajectory], layout_name: str) -> list[Trajectory]:
+    """Trajectories with another name of their layout."""
     return [dataclasses.replace(each, layout_name=layout_name) for each in trajectories]
 
 

@@ -70,11 +70,10 @@ def result_tables(found: Findings) -> dict[str, pd.DataFrame]:
 
 
 def _choices(found: Findings) -> pd.DataFrame:
-    """Answers that are no numbers of a scale: how often each was given; free texts one by one."""
+    """Every answer of a questionnaire, and how often it was given; free texts among them."""
     answers = found.data.of_analysed("questionnaires")
-    scaled = set(zip(found.data.tables["scales"]["questionnaire"], found.data.tables["scales"]["scale"], strict=True))
-    own = answers[answers["value"].notna() & (answers["questionnaire"] != "") & (answers["item"] != "consent")]
-    if not len(own) or not len(scaled | {("", "")}):
+    own = answers[answers["value"].notna() & answers["questionnaire"].isin(set(answers["questionnaire"]) - {"", "consent"})]
+    if not len(own):
         return own.head(0)
     keys = ["questionnaire", "condition", "item", "value"]
     return own.groupby(keys, sort=False).size().rename("times").reset_index()
@@ -156,7 +155,7 @@ def _accuracy(study: Study, found: Findings, settings: AnalysisSettings, folder:
     tables = {"Figures of merit, mean over 10 to 90 % observed": found.metrics}
     if found.comparisons:
         tables["Over all fractions: repeated-measures analyses of variance"] = result_tables(found)["anova"]
-        tables["Every pair of conditions (Tukey)"] = result_tables(found)["accuracy_pairs"].drop(columns="fraction")
+        tables["Every pair of conditions (Tukey)"] = result_tables(found)["accuracy_pairs"].drop(columns=["fraction", "cohens_d"])
     drawn = figures.draw_accuracy(found.comparisons, chances, study.conditions[::-1], folder)
     return Section("How well goals are predicted", text, tables, drawn)
 
@@ -207,7 +206,8 @@ def _confusions(study: Study, found: Findings, folder: Path) -> Section | None:
         for name in study.conditions
         if len(rows[(rows["predictor"] == predictor) & (rows["condition"] == name)])
     }
-    return Section("Confusions", "", {}, figures.draw_confusions(matrices, predictor, folder))
+    text = f"Trajectories by true and predicted goal, mean over fractions observed and repeats; predictions of {predictor}."
+    return Section("Confusions", text, {}, figures.draw_confusions(matrices, predictor, folder))
 
 
 def _spread(study: Study, found: Findings, folder: Path) -> Section | None:
@@ -233,7 +233,8 @@ def _spread(study: Study, found: Findings, folder: Path) -> Section | None:
 
 
 def _different(family: Family, alpha: float = 0.05) -> list[str]:
-    return family.tests[family.tests["p_holm"] < alpha]["measure"].tolist() if len(family.tests) else []
+    sure = family.tests[family.tests["p_holm"] < alpha]["measure"].tolist() if len(family.tests) else []
+    return [str(name).partition(",")[0] for name in sure]  # without its unit
 
 
 def _family_tables(family: Family, pairs: str) -> dict[str, pd.DataFrame]:
@@ -258,9 +259,11 @@ def _work(study: Study, found: Findings, folder: Path) -> Section:
     )
     drawn = []
     if len(found.work.means):
-        shown = [name for name in MEASURES[content.domain].values() if name in set(found.work.means["measure"])][:8]
+        varying = found.work.means.groupby("measure")["mean"].agg(lambda means: means.max() > means.min())
+        shown = [name for name in MEASURES[content.domain].values() if varying.get(name, False)][:8]
         means = found.work.means[found.work.means["measure"].isin(shown)]
-        drawn = [figures.interval_panels(means, "condition", study.conditions, "How participants worked", folder / "work.svg")]
+        path, title = folder / "work.svg", "How participants worked"
+        drawn = [figures.interval_panels(means, "condition", study.conditions, title, path)] if shown else []
     return Section("How participants worked", text, _family_tables(found.work, "Every pair (Tukey)"), drawn)
 
 
