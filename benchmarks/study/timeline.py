@@ -6,17 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
 
+from benchmarks.study.design.endings import ENDINGS, Ending
 from benchmarks.study.design.study import Study
 
 __all__ = ["ENDINGS", "GAMES", "Ending", "Kind", "Screen", "timeline"]
 
 Kind = Literal["device", "consent", "text", "practice", "round", "questionnaire", "pause"]
-Ending = Literal[
-    "complete", "refused", "device_failed", "practice_failed", "timed_out", "blocked", "expired", "withdrawn"
-]
-ENDINGS: Final[tuple[Ending, ...]] = (
-    "complete", "refused", "device_failed", "practice_failed", "timed_out", "blocked", "expired", "withdrawn",
-)  # fmt: skip
 GAMES: Final = ("practice", "round")
 
 
