@@ -38,6 +38,7 @@ __all__ = [
     "YamlModel",
     "as_path",
     "as_plain",
+    "problems_of",
     "validated",
 ]
 
@@ -146,6 +147,29 @@ def validated(model: type[Model], data: object, what: str = "", *, error: MakeEr
         raise error(f"{said}{more}" if is_placed else f"{what}: {said}{more}") from None
 
 
+def problems_of(model: type[BaseModel], data: object, what: str = "") -> list[tuple[tuple[str | int, ...], str]]:
+    """Everything that is wrong with plain data, where :func:`validated` says what is wrong first.
+
+    Args:
+        model: What is expected.
+        data: What a file holds.
+        what: What messages call the whole, such as the name of the file.
+
+    Returns:
+        Keys and positions of each value that is wrong (of an unknown key: of the mapping and the key; of a missing one:
+        of the mapping), and what was expected and what came; empty where nothing is wrong.
+    """
+    try:
+        model.model_validate(data)
+    except ValidationError as refusal:
+        found = []
+        for problem in refusal.errors(include_url=False):
+            location = _place_of(problem)
+            found.append((location[:-1] if problem["type"] == "missing" else location, _said(model, problem, what)))
+        return found
+    return []
+
+
 def as_plain(data: object) -> Any:
     """Data of a program as a file would hold them: lists for tuples and arrays, dictionaries for other mappings.
 
@@ -191,9 +215,15 @@ def _telling_first(problems: list[Any]) -> list[Any]:
     return problems
 
 
+def _place_of(problem: Mapping[str, Any]) -> tuple[str | int, ...]:
+    """Keys and positions; pydantic adds one of its own for a key that is wrong."""
+    location: tuple[str | int, ...] = problem["loc"]
+    return location[:-1] if location[-1:] == ("[key]",) else location
+
+
 def _said(model: type[BaseModel], problem: Mapping[str, Any], what: str) -> str:
     """One of pydantic's problems in our words."""
-    kind, location, value = problem["type"], problem["loc"], problem["input"]
+    kind, location, value = problem["type"], _place_of(problem), problem["input"]
     path = f"`{as_path(location)}`" if location else what or "it"
     if kind == "value_error":
         return str(problem["ctx"]["error"]).replace(_HERE, path)
