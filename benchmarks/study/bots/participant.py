@@ -20,6 +20,8 @@ from benchmarks.study.games import make_game
 from benchmarks.study.timeline import GAMES, Screen, timeline
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from benchmarks.study.design.study import Study
     from benchmarks.study.games.base import Game
 
@@ -37,7 +39,8 @@ class Pace:
     """How fast a bot is.
 
     Attributes:
-        factor: 0: as fast as the server answers; 1: as fast as people; 0.5: twice as fast.
+        factor: 0: as fast as the server answers; 1: as fast as people; 0.5: twice as fast. The times that the bot tells
+            the server are those of people in any case.
         key: Seconds between two keys of a person, median.
         screen: Seconds at a text or questionnaire, median.
     """
@@ -46,10 +49,6 @@ class Pace:
     key: float = 0.2
     screen: float = 4.0
 
-    async def think(self, seconds: float) -> None:
-        """Wait as long as a person would."""
-        if self.factor > 0:
-            await asyncio.sleep(self.factor * seconds)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,12 +63,13 @@ class Acknowledged:
 
 @dataclass(eq=False)
 class _Round:
-    """A game in play: the bot's own board, and the moves that are not acknowledged yet."""
+    """A game in play: the bot's own board, when keys come, and ``(move, action)`` that are not acknowledged yet."""
 
     screen: Screen
     attempt: int
     game: Game
     player: Player
+    keys: np.random.Generator
     told: int = 0
     moves: list[Any] = field(default_factory=list)
 
@@ -86,7 +86,8 @@ class Participant:
         person: Who plays.
         link: The participants' link.
         pace: How fast.
-        leaves_after: The bot leaves for good after so many acknowledged steps; None: never.
+        leaves_at: The bot leaves for good at the n-th screen (from 0) that it meets, in a game after so many steps:
+            ``(n, steps)``; None: never.
         keep_log: Whether to keep every acknowledged step.
         patience: Seconds to wait for a server that is away.
 
@@ -106,7 +107,7 @@ class Participant:
         link: str,
         *,
         pace: Pace | None = None,
-        leaves_after: int | None = None,
+        leaves_at: tuple[int, int] | None = None,
         keep_log: bool = False,
         patience: float = 30.0,
     ) -> None:
@@ -114,7 +115,7 @@ class Participant:
         self.person = person
         self.link = link
         self.pace = pace or Pace()
-        self.leaves_after = leaves_after
+        self.leaves_at = leaves_at
         self.patience = patience
         self.token = self.ending = self.code = ""
         self.steps = self.lost = 0
@@ -122,7 +123,8 @@ class Participant:
         self._screens = {screen.name: screen for screen in timeline(study, study.conditions)}
         self._round: _Round | None = None
         self._habits = person.rng("habits")
-        self._started = time.monotonic()
+        self._met: dict[tuple[str, int], int] = {}
+        self._clock = 1000.0
 
     async def run(self) -> str:
         """Take part.
@@ -160,9 +162,9 @@ class Participant:
             return screen
         if kind in GAMES:
             return await self._play(link, screen)
-        await self.pace.think(float(self._habits.lognormal(0.0, 0.5)) * self.pace.screen)
-        if self._has_left():
+        if self._has_left(screen):
             return screen
+        await self._think(float(self._habits.lognormal(0.0, 0.5)) * self.pace.screen)
         if kind == "device":
             return await link.ask(await self._device(link, screen))
         if kind == "consent":
@@ -173,8 +175,15 @@ class Participant:
             return await link.ask({"type": "next"})
         raise BotError(f"a bot does not know screens of kind {kind!r}")
 
-    def _has_left(self) -> bool:
-        if self.leaves_after is not None and self.steps >= self.leaves_after:
+    async def _think(self, seconds: float) -> None:
+        """Let the person's own clock go on, and wait as much as the pace says."""
+        self._clock += 1000.0 * seconds
+        if self.pace.factor > 0:
+            await asyncio.sleep(self.pace.factor * seconds)
+
+    def _has_left(self, screen: dict[str, Any], steps: int = 0) -> bool:
+        met = self._met.setdefault((screen["name"], screen.get("attempt", 1)), len(self._met))
+        if self.leaves_at is not None and (met, steps) >= self.leaves_at:
             self.ending = "left"
         return bool(self.ending)
 
@@ -183,7 +192,7 @@ class Participant:
         needs, trips = screen["needs"], []
         for _ in range(_PINGS):
             begun = time.monotonic()
-            await link.ask({"type": "ping", "at": 1000.0 * (begun - self._started)})
+            await link.ask({"type": "ping", "at": self._clock})
             trips.append(1000.0 * (time.monotonic() - begun))
         return {
             "type": "device",
@@ -207,18 +216,17 @@ class Participant:
 
     async def _play(self, link: Link, screen: dict[str, Any]) -> dict[str, Any]:
         if not screen["begun"]:
-            await self.pace.think(self.pace.screen)
-            return screen if self._has_left() else await link.ask({"type": "next"})
+            await self._think(self.pace.screen)
+            return await link.ask({"type": "next"})
         current = self._take_up(screen)
-        while not (screen_over := current.told == current.game.steps and current.game.is_over):
-            if self._has_left():
+        while current.told < current.game.steps or not current.game.is_over:
+            if self._has_left(screen, current.told):
                 return screen
             message, played = await self._next_message(current)
             answer = await link.ask(message)
             if answer["type"] != "state":
                 raise BotError(f"a step is answered by {json.dumps(answer)[:300]}")
             self._acknowledge(current, answer["state"], played)
-        assert screen_over
         self._round = None
         current.game.close()
         return await link.hear()
@@ -234,7 +242,8 @@ class Participant:
             # The seed is the server's secret: nothing in these games is random.
             game = make_game(self.study, shown, 0, reaches_left=screen["scene"].get("wanted"))
             player = make_player(self.study, game, self.person, shown, screen["attempt"])
-            current = self._round = _Round(shown, screen["attempt"], game, player)
+            keys = self.person.rng("keys", *key)
+            current = self._round = _Round(shown, screen["attempt"], game, player, keys)
             self._compare(current, state)
             return current
         if not current.told <= state["n"] <= current.game.steps:
@@ -269,22 +278,21 @@ class Participant:
 
     async def _next_message(self, current: _Round) -> tuple[dict[str, Any], int]:
         """The next steps to tell, played on the bot's own board first; and up to which step they lead."""
-        now = 1000.0 * (time.monotonic() - self._started)
         if self.study.content.domain == "overcooked":
             if not current.moves:
-                await self.pace.think(float(self._habits.lognormal(0.0, 0.35)) * self.pace.key)
                 self._move(current)
-            action = current.moves[0][0]
-            return {"type": "step", "n": current.told, "action": action, "down": now, "shown": now - 1.0}, (
-                current.told + 1
-            )
+            shown = self._clock
+            await self._think(float(current.keys.lognormal(0.0, 0.35)) * self.pace.key)
+            message = {"type": "step", "n": current.told, "action": current.moves[0][0]}
+            return {**message, "down": round(self._clock, 1), "shown": round(shown, 1)}, current.told + 1
         batch = _BATCH if self.pace.factor == 0 else _TOLD
         while len(current.moves) < batch and not current.game.is_over:
             self._move(current)
-        told = current.moves[:batch]
-        await self.pace.think(len(told) / 30)
+        told, shown = current.moves[:batch], self._clock
+        await self._think(len(told) / 30)
         samples = [[(current.told + k) * 1000.0 / 30, *point] for k, (point, _) in enumerate(told, 1)]
-        return {"type": "pointer", "n": current.told, "samples": samples, "shown": now}, current.told + len(told)
+        message = {"type": "pointer", "n": current.told, "samples": samples, "shown": round(shown, 1)}
+        return message, current.told + len(told)
 
     def _move(self, current: _Round) -> None:
         """Choose a move and take it on the bot's own board."""

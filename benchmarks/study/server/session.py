@@ -125,6 +125,9 @@ class Session:
             return
         if self.game is None:
             await self._take_up(screen)
+        if self.game is not None and self.game.is_over:  # the server died between the last step and what follows it
+            await self._game_over(self.game)
+            return
         if self.game is not None and not is_same_page and limits.resume != "resume":
             if limits.resume == "block":
                 await self._end("blocked")
