@@ -86,8 +86,8 @@ class Participant:
         person: Who plays.
         link: The participants' link.
         pace: How fast.
-        leaves_at: The bot leaves for good at the n-th screen (from 0) that it meets, in a game after so many steps:
-            ``(n, steps)``; None: never.
+        leaves_at: ``(progress, steps)``: the bot leaves for good at the first screen so far on (0 to 1); if that is a
+            game, after so many steps. None: never.
         keep_log: Whether to keep every acknowledged step.
         patience: Seconds to wait for a server that is away.
 
@@ -107,7 +107,7 @@ class Participant:
         link: str,
         *,
         pace: Pace | None = None,
-        leaves_at: tuple[int, int] | None = None,
+        leaves_at: tuple[float, int] | None = None,
         keep_log: bool = False,
         patience: float = 30.0,
     ) -> None:
@@ -123,7 +123,7 @@ class Participant:
         self._screens = {screen.name: screen for screen in timeline(study, study.conditions)}
         self._round: _Round | None = None
         self._habits = person.rng("habits")
-        self._met: dict[tuple[str, int], int] = {}
+        self._leaves_from = ""
         self._clock = 1000.0
 
     async def run(self) -> str:
@@ -182,10 +182,13 @@ class Participant:
             await asyncio.sleep(self.pace.factor * seconds)
 
     def _has_left(self, screen: dict[str, Any], steps: int = 0) -> bool:
-        met = self._met.setdefault((screen["name"], screen.get("attempt", 1)), len(self._met))
-        if self.leaves_at is not None and (met, steps) >= self.leaves_at:
+        if self.leaves_at is None or screen["progress"] < self.leaves_at[0]:
+            return False
+        self._leaves_from = self._leaves_from or screen["name"]
+        plays_on = screen["kind"] in GAMES and screen["name"] == self._leaves_from and steps < self.leaves_at[1]
+        if not plays_on:
             self.ending = "left"
-        return bool(self.ending)
+        return not plays_on
 
     async def _device(self, link: Link, screen: dict[str, Any]) -> dict[str, Any]:
         """What a good device finds, and the true way to the server and back."""

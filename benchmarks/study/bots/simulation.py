@@ -104,10 +104,11 @@ def simulate(
     return _summary(study, bots, first, seconds)
 
 
-def _leaving(person: Person, drop_out: float, screens: int) -> tuple[int, int] | None:
-    """At which screen, and after how many steps there, a person goes away; None for those who stay."""
+def _leaving(person: Person, drop_out: float, screens: int) -> tuple[float, int] | None:
+    """How far on, and after how many steps of a game there, a person goes away; None for those who stay."""
     rng = person.rng("leaving")
-    return (int(rng.integers(1, screens)), int(rng.integers(60))) if rng.random() < drop_out else None
+    leaves, share, steps = rng.random() < drop_out, rng.random(), int(rng.integers(60))
+    return (float(share) * (screens - 2) / screens, steps) if leaves else None
 
 
 def _count(study: Study) -> int:
