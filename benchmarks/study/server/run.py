@@ -114,6 +114,7 @@ def make_server(
         server_header=False,
         ws="websockets-sansio",
         ws_max_size=65_536,
+        ws_per_message_deflate=False,  # messages are small; a compressor for each connection takes 300 kB
         ws_ping_interval=20.0,
         ws_ping_timeout=30.0,
         timeout_graceful_shutdown=3,

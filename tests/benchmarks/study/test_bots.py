@@ -144,7 +144,8 @@ def test_a_study_of_bots_gives_the_result_of_the_people_themselves(tmp_path: Pat
     """Accuracy of Eq. 1 at half of the way: bots through the server, and other people of the population directly."""
     from predictors import make_predictor
 
-    study = load_study(small_study(tmp_path / "study", "overcooked", conditions=1))
+    soups = '[["tomato", "tomato", "onion"], ["onion", "onion", "cabbage"]]'
+    study = load_study(small_study(tmp_path / "study", "overcooked", conditions=1, soups=soups))
     found = simulate(study, 8, seed=100)
     through: list[Any] = []
     with open_readonly(database_path(study.folder, "debug")) as connection:
