@@ -21,6 +21,7 @@ from benchmarks.cli.options import (
 )
 from benchmarks.cli.program import STOPPED, Commands, Program
 from benchmarks.cli.reproduce import reproduce
+from benchmarks.cli.study import study
 from benchmarks.cli.sweep import sweep
 from benchmarks.console import tell
 from legible_envs import __version__
@@ -33,6 +34,7 @@ CONTENTS = {
     "Layouts": ("score", "show", "play"),
     "Participants and predictors": ("humans fetch", "humans stats", "humans evaluate"),
     "Experiments": ("sweep", "reproduce", "bench"),
+    "Studies with people": ("study new", "study check"),
     "About": ("demo", "workspaces", "emitters"),
 }
 """Sections of ``legible --help``: every command, in order."""
@@ -70,6 +72,7 @@ def main(traceback: bool) -> None:
 
 main.add_command(sweep)
 main.add_command(reproduce)
+main.add_command(study)
 
 
 # -- search ------------------------------------------------------------------------------------------------------------

@@ -15,7 +15,7 @@ from legible_envs.support.models import as_path
 from legible_envs.support.text import decode_text
 from legible_envs.support.validation import shown
 
-__all__ = ["MOST_BYTES", "SETTINGS", "Draft", "path_problem"]
+__all__ = ["MOST_BYTES", "SETTINGS", "Draft", "is_english", "path_problem", "problem_at", "read_bounded"]
 
 SETTINGS: Final = "study.toml"
 MOST_BYTES: Final = 1_000_000
@@ -32,6 +32,7 @@ class Draft:
         content: Its settings.
         texts: Markdown by name.
         words: Short texts by key.
+        words_source: The text of their file; empty where those of the package are used.
         layouts: Contents of layout files, by the path that the settings name.
         task: The text of the task's file; empty for a built-in task.
         questionnaires: By name.
@@ -43,6 +44,7 @@ class Draft:
     content: StudyContent
     texts: dict[str, str] = field(default_factory=dict)
     words: dict[str, str] = field(default_factory=dict)
+    words_source: str = ""
     layouts: dict[str, str] = field(default_factory=dict)
     task: str = ""
     questionnaires: dict[str, Questionnaire] = field(default_factory=dict)
@@ -83,6 +85,11 @@ class Draft:
         else:
             self.refuse_file(name, message)
         return None
+
+
+def is_english(content: StudyContent) -> bool:
+    """Whether the study is in the language of the package's texts."""
+    return content.language.split("-")[0] == "en"
 
 
 def problem_at(file: str, source: str, path: Sequence[str | int], message: str, *, warn: bool = False) -> Problem:

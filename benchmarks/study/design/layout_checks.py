@@ -25,7 +25,7 @@ Path = tuple[str | int, ...]
 
 
 def check_layouts(draft: Draft) -> None:
-    """Note every layout that cannot be played, predictors and partners that are unknown, and files that nothing uses."""
+    """Note layouts that cannot be played, predictors and partners that are unknown, and files that nothing uses."""
     task = _task_of(draft) if draft.content.domain == "tabletop" else None
     for number, entry in enumerate(draft.content.conditions):
         _check_layout(draft, entry.layout, ("conditions", number, "layout"), f"condition {entry.name!r}", task)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from benchmarks.study.design.package_files import list_files, read_file, scale_names
+from benchmarks.study.design.package_files import package_texts, read_file, scale_names
 from benchmarks.study.design.sources import DOMAINS, all_conditions, practice_layout
 from benchmarks.study.errors import StudyError
 from legible_envs.support.files import write_text
@@ -54,9 +54,8 @@ def new_study(folder: str | Path, *, domain: str, sources: Sequence[str] = (), l
     files = {each.file(domain): each.layout for each in (*conditions, practice)}
     if len(files) <= len(conditions):
         raise StudyError(f"a condition cannot be called {practice.name!r}: its layout would be that of the practice")
-    for part in ("common", domain):
-        for name in list_files(f"texts/{part}"):
-            files[f"texts/{name}"] = read_file(f"texts/{part}/{name}")
+    files |= {f"texts/{name}.md": text for name, text in package_texts(domain).items()}
+    files["texts/words.toml"] = read_file("texts/common/words.toml")
     files[".gitignore"] = _IGNORED
     files["study.toml"] = _settings(
         name=file_name(folder.resolve().name.replace("#", "-"))[:80].rstrip(". "),

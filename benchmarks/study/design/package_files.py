@@ -7,7 +7,7 @@ from importlib import resources
 from importlib.resources.abc import Traversable
 from typing import Final
 
-__all__ = ["default_words", "list_files", "read_file", "scale_names"]
+__all__ = ["default_words", "list_files", "package_texts", "read_file", "scale_names"]
 
 _HERE: Final = "benchmarks.study.design"
 
@@ -28,6 +28,16 @@ def read_file(path: str) -> str:
 def list_files(folder: str) -> list[str]:
     """Names of the files of a folder below this package, sorted."""
     return sorted(entry.name for entry in _at(folder).iterdir() if entry.is_file())
+
+
+def package_texts(domain: str) -> dict[str, str]:
+    """The Markdown texts of a new study of a domain, by name."""
+    return {
+        name.removesuffix(".md"): read_file(f"texts/{part}/{name}")
+        for part in ("common", domain)
+        for name in list_files(f"texts/{part}")
+        if name.endswith(".md")
+    }
 
 
 def scale_names() -> list[str]:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks.study.design.draft import SETTINGS, Draft, path_problem, problem_at, read_bounded
+from benchmarks.study.design.draft import SETTINGS, Draft, is_english, path_problem, problem_at, read_bounded
 from benchmarks.study.design.models import StudyContent
 from benchmarks.study.design.package_files import default_words, read_file, scale_names
 from benchmarks.study.design.questionnaires import Questionnaire, item_problems
@@ -78,12 +78,13 @@ def _read_texts(draft: Draft) -> None:
 
 def _read_words(draft: Draft) -> None:
     file = f"{draft.content.texts}/words.toml"
-    if draft.content.language.split("-")[0] == "en" and not (draft.folder / file).exists():
+    if is_english(draft.content) and not (draft.folder / file).exists():
         draft.words = default_words()
         return
     source = draft.read(file, "the short texts of the page")
     if source is None:
         return
+    draft.words_source = source
     try:
         found = parse_toml(source)
     except ValueError as error:
@@ -137,7 +138,7 @@ def _find_questionnaire(draft: Draft, name: str, number: int) -> tuple[str, str]
             source = draft.read(file, f"the questionnaire {name!r}", *path)
             return None if source is None else (file, source)
     if name in scale_names():
-        if draft.content.language.split("-")[0] != "en":
+        if not is_english(draft.content):
             draft.refuse(
                 f"the questionnaire {name!r} of the package is in English, the study in {draft.content.language!r}: "
                 f"translate it in {places[0]}",

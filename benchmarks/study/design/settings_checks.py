@@ -204,12 +204,12 @@ def _check_recruitment(draft: Draft) -> None:
             draft.refuse(f"`recruitment.completion_url` {message}", "recruitment", "completion_url")
     if recruitment.source != "none" and not recruitment.completion_url and "complete" not in recruitment.codes:
         takes = {
-            "prolific": "https://app.prolific.com/submissions/complete?cc=CODE as `completion_url`, or a code",
-            "mturk": "a code, or workers enter their own",
+            "prolific": "https://app.prolific.com/submissions/complete?cc={code} as `completion_url`, or a code",
+            "mturk": "a code",
         }[recruitment.source]
         draft.refuse(
-            f"participants of {recruitment.source} take nothing back that the platform knows: give {takes} of "
-            "`recruitment.codes`. Without, each participant has a code of their own, which `legible study code` verifies",
+            f"participants of {recruitment.source} take nothing back that the platform knows: give {takes} in "
+            "`recruitment.codes`. Without, each has a code of their own, which `legible study code` verifies",
             *("recruitment", "source"),
             warn=True,
         )

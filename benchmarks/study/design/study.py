@@ -26,8 +26,8 @@ class Study:
     Attributes:
         folder: Where it lies.
         content: The settings of ``study.toml``.
-        texts: Markdown by name: ``welcome``, ``consent``, ``instructions``, …. Those about practice and pauses are there
-            only where the study has them.
+        texts: Markdown by name: ``welcome``, ``consent``, ``instructions``, …. Those about practice and pauses are
+            there only where the study has them.
         words: The short texts of the page (buttons, warnings) by key.
         layouts: Contents of layout files, by the path that the settings name.
         questionnaires: By name.

@@ -6,11 +6,9 @@ import re
 from difflib import get_close_matches
 from typing import Final
 
-from benchmarks.study.design.draft import SETTINGS, Draft
-from benchmarks.study.design.package_files import default_words
+from benchmarks.study.design.draft import SETTINGS, Draft, is_english, problem_at
+from benchmarks.study.design.package_files import default_words, package_texts
 from benchmarks.study.design.text_names import known_texts, needed_texts
-from benchmarks.study.design.toml_lines import line_of
-from benchmarks.study.errors import Problem
 
 __all__ = ["check_texts"]
 
@@ -27,6 +25,8 @@ def check_texts(draft: Draft) -> None:
     for name, text in draft.texts.items():
         _check_text(draft, f"{draft.content.texts}/{name}.md", text)
     _check_words(draft)
+    if not is_english(draft.content):
+        _check_translated(draft)
     _check_unused(draft)
 
 
@@ -44,8 +44,8 @@ def _check_text(draft: Draft, file: str, text: str) -> None:
         (_HTML, "HTML is shown as it is written, not as HTML"),
         (_PICTURE, "pictures are not shown: the page asks no other host, and a study has no files of pictures"),
     ):
-        if match := pattern.search(text):
-            draft.refuse_file(file, message, line=text.count("\n", 0, match.start()) + 1, warn=True)
+        if (found := pattern.search(text)) is not None:
+            draft.refuse_file(file, message, line=text.count("\n", 0, found.start()) + 1, warn=True)
 
 
 def _check_words(draft: Draft) -> None:
@@ -53,11 +53,9 @@ def _check_words(draft: Draft) -> None:
     if not draft.words:
         return  # said elsewhere
     defaults = default_words()
-    path = draft.folder / file
-    source = path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
 
     def refuse(key: str, message: str) -> None:
-        draft.problems.append(Problem(file, message, key, line_of(source, (key,))))
+        draft.problems.append(problem_at(file, draft.words_source, (key,), message))
 
     for key in [key for key in defaults if key not in draft.words]:
         refuse(key, f"the key `{key}` is missing; in English it is {defaults[key]!r}")
@@ -72,6 +70,22 @@ def _check_words(draft: Draft) -> None:
         if wanted != found:
             expected = ", ".join(f"{{{name}}}" for name in wanted) or "no {value}"
             refuse(key, f"`{key}` must hold {expected}, as in English ({defaults[key]!r}); got {text!r:.200}")
+
+
+def _check_translated(draft: Draft) -> None:
+    """Warn about texts of the package that are still as they were written, in English."""
+    folder, language = draft.content.texts, draft.content.language
+    for name, text in package_texts(draft.content.domain).items():
+        if draft.texts.get(name) == text:
+            draft.refuse_file(f"{folder}/{name}.md", f"the text is still in English, not in {language!r}", warn=True)
+    defaults = default_words()
+    same = [key for key, text in draft.words.items() if defaults.get(key) == text and any(c.isalpha() for c in text)]
+    if len(same) > len(defaults) // 2:
+        draft.refuse_file(
+            f"{folder}/words.toml",
+            f"{len(same)} of {len(defaults)} words are still in English, such as {same[0]}",
+            warn=True,
+        )
 
 
 def _check_unused(draft: Draft) -> None:

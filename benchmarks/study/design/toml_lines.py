@@ -24,7 +24,7 @@ _SKIPPED: Final = re.compile(
 
 
 def line_of(text: str, path: Sequence[str | int]) -> int:
-    """The line of a value, or of the nearest thing around it that has one.
+    r"""The line of a value, or of the nearest thing around it that has one.
 
     Tables (``[name]``), entries of lists of tables (``[[name]]``) and keys have lines; what stands in a list or table
     written in braces has the line of its key.
@@ -37,7 +37,7 @@ def line_of(text: str, path: Sequence[str | int]) -> int:
         From 1; 0 where nothing of the path is there.
 
     Example:
-        >>> text = 'name = "a"\\n[[conditions]]\\nname = "b"\\n\\n[[conditions]]\\nlayout = "c"\\n'
+        >>> text = 'name = "a"\n[[conditions]]\nname = "b"\n\n[[conditions]]\nlayout = "c"\n'
         >>> line_of(text, ("conditions", 1, "layout")), line_of(text, ("conditions", 1, "name"))
         (6, 5)
     """
