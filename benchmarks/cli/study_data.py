@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from benchmarks.study.analysis.report import Analysed
     from benchmarks.study.design.study import Study
 
-__all__ = ["DATA_COMMANDS", "add_to"]
+__all__ = ["DATA_COMMANDS"]
 
 study_folder = click.argument("folder", metavar="STUDY", type=click.Path(exists=True, file_okay=False, path_type=Path))
 debug_option = click.option("--debug", is_flag=True, help="The debug data: of simulate, or of debug links.")
@@ -437,9 +437,3 @@ def progress(folder: Path, out: Path | None, with_worker_ids: bool, debug: bool)
 
 DATA_COMMANDS = (export, analyse, replay, verify, power, forget, hand_out, progress)
 """In the order of ``legible study --help``."""
-
-
-def add_to(group: click.Group) -> None:
-    """Add the commands to a group."""
-    for command in DATA_COMMANDS:
-        group.add_command(command)
