@@ -53,8 +53,7 @@ def table_measures() -> dict[str, Any]:
         "colours": dict(TABLE),
         "named": dict(NAMED),
         "glyphs": {
-            name: " ".join(f"{round(x * UNIT)},{round(y * UNIT)}" for x, y in points)
-            for name, points in GLYPHS.items()
+            name: " ".join(f"{round(x * UNIT)},{round(y * UNIT)}" for x, y in points) for name, points in GLYPHS.items()
         },
         "hand_span": HAND_SPAN,
         "gripper_span": GRIPPER_SPAN,
