@@ -158,6 +158,10 @@ def _check_repeated(draft: Draft) -> None:
         seen.setdefault(text, entry.name)
 
 
+_BUILT_IN: Final = "bayesian"
+"""Always there, in both domains. Looking it up would load the learners: 80 MB in every server, a second in commands."""
+
+
 def _check_predictors(draft: Draft) -> None:
     content = draft.content
     if content.domain == "overcooked":
@@ -192,9 +196,11 @@ def _quiet_task(draft: Draft) -> TabletopTask | None:
 
 
 def _check_kitchen_predictor(draft: Draft) -> None:
+    name = draft.content.predictor
+    if name == _BUILT_IN:
+        return
     from predictors.registry import PredictorError, list_predictors, make_predictor
 
-    name = draft.content.predictor
     try:
         make_predictor(name)
     except PredictorError as error:
@@ -206,6 +212,8 @@ def _check_kitchen_predictor(draft: Draft) -> None:
 
 
 def _check_table_predictor(draft: Draft, name: str, *path: str) -> None:
+    if name == _BUILT_IN:
+        return
     from legible_envs.tabletop.partner.intent import make_intent_predictor
     from predictors.registry import list_predictors
 
@@ -220,10 +228,11 @@ def _check_table_predictor(draft: Draft, name: str, *path: str) -> None:
 
 
 def _check_unused(draft: Draft) -> None:
-    place = draft.folder / "layouts"
+    place, practice = draft.folder / "layouts", draft.content.practice
+    used = {entry.layout for entry in draft.content.conditions} | ({practice.layout} if practice is not None else set())
     if not place.is_dir() or not place.resolve().is_relative_to(draft.folder.resolve()):
         return
     for entry in sorted(place.iterdir()):
         name = f"layouts/{entry.name}"
-        if entry.is_file() and not entry.name.startswith(".") and entry.suffix != ".md" and name not in draft.layouts:
+        if entry.is_file() and not entry.name.startswith(".") and entry.suffix != ".md" and name not in used:
             draft.refuse_file(name, f"nothing in {SETTINGS} uses this file", warn=True)
