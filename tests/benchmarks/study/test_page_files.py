@@ -31,7 +31,9 @@ def test_nothing_comes_from_elsewhere_or_is_inline() -> None:
     for name, text in PAGES.items():
         known = text.replace("http://www.w3.org/2000/svg", "")  # a name, not an address
         assert not re.search(r"https?://|//cdn|@import", known), name
-        assert not re.search(r"\seval\(|new Function|localStorage|sessionStorage|document\.cookie|indexedDB", text), name
+        assert not re.search(r"\seval\(|new Function|localStorage|sessionStorage|document\.cookie|indexedDB", text), (
+            name
+        )
     assert not re.search(r"\sstyle=|\son[a-z]+=|<style|<script>", PAGES["index.html.j2"])
 
 

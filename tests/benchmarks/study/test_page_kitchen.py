@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,32 +15,12 @@ from tests.benchmarks.study.participants import begin, come, cook, cook_everythi
 from tests.benchmarks.study.small_studies import LEGIBLE_WAY, SMALL_WAY
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page
+    from playwright.sync_api import Page
 
 pytestmark = pytest.mark.slow
 
 PHONE = {"viewport": {"width": 360, "height": 740}, "has_touch": True, "is_mobile": True, "device_scale_factor": 2}
 TLX = {"questionnaires": [{"name": "nasa-tlx", "after": "study"}]}
-
-
-@pytest.fixture
-def open_page(browser: Browser) -> Iterator[Callable[..., Page]]:
-    """Opens pages of contexts of their own; a test fails if a script on one of them did."""
-    contexts, errors = [], []
-
-    def open_one(**options: Any) -> Page:
-        context = browser.new_context(**({"viewport": {"width": 1280, "height": 800}} | options))
-        contexts.append(context)
-        page = context.new_page()
-        page.set_default_timeout(20_000)
-        page.on("pageerror", lambda error: errors.append(str(error)))
-        page.on("console", lambda m: errors.append(m.text) if "Security Policy" in m.text else None)
-        return page
-
-    yield open_one
-    for context in contexts:
-        context.close()
-    assert not errors
 
 
 def test_a_whole_study_by_keyboard(open_page: Callable[..., Page], write_study: Any) -> None:

@@ -216,7 +216,10 @@ def test_codes_are_a_participants_own_and_can_be_verified_later(tmp_path: Path) 
 @pytest.mark.parametrize(
     ("deleted", "screen"),
     [
-        ("DELETE FROM steps WHERE step = 5 AND visit = (SELECT visit FROM visits WHERE name = 'round#A#1')", "round#A#1"),
+        (
+            "DELETE FROM steps WHERE step = 5 AND visit = (SELECT visit FROM visits WHERE name = 'round#A#1')",
+            "round#A#1",
+        ),
         ("DELETE FROM steps WHERE step = 13", "round#A#1"),
         ("DELETE FROM answers WHERE item = 'easy'", "study#asked"),
         ("DELETE FROM answers WHERE item = 'consent'", "consent"),
@@ -413,7 +416,9 @@ def test_worker_ids_are_in_one_table(tmp_path: Path) -> None:
         with server.page(server.join(PROLIFIC_PID="secret-worker", STUDY_ID="st", SESSION_ID="se")) as page:
             page.finish()
         tables = [row[0] for row in server.rows("SELECT name FROM sqlite_master WHERE type = 'table'")]
-        found = [name for name in tables if "secret-worker" in str([tuple(r) for r in server.rows(f"SELECT * FROM {name}")])]
+        found = [
+            name for name in tables if "secret-worker" in str([tuple(r) for r in server.rows(f"SELECT * FROM {name}")])
+        ]
         assert found == ["workers"]
 
 
