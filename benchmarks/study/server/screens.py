@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
 
 from benchmarks.study.timeline import GAMES
 
 if TYPE_CHECKING:
-    from benchmarks.study.server.session import Session
+    from benchmarks.study.server.progress import Progress
     from benchmarks.study.timeline import Screen
 
 __all__ = ["describe"]
 
 
-def describe(session: Session) -> dict[str, Any]:
+def describe(session: Progress) -> dict[str, Any]:
     """The message ``screen`` of a session; see :mod:`benchmarks.study.server.protocol`."""
     context, screen = session.context, session.screen
     if screen is None:
@@ -22,7 +24,7 @@ def describe(session: Session) -> dict[str, Any]:
         "type": "screen",
         "name": screen.name,
         "kind": screen.kind,
-        "progress": round(session.index / max(1, len(session.screens)), 3),
+        "progress": _share(session),
         "html": context.text(screen.text) if screen.text else "",
     }
     if screen.kind == "device":
@@ -40,7 +42,7 @@ def describe(session: Session) -> dict[str, Any]:
     return found
 
 
-def _game(session: Session, screen: Screen) -> dict[str, Any]:
+def _game(session: Progress, screen: Screen) -> dict[str, Any]:
     content, game = session.context.study.content, session.game
     conditions = list(
         dict.fromkeys(s.condition for s in session.screens if s.kind == "round" and s.sitting == screen.sitting)
@@ -64,19 +66,28 @@ def _game(session: Session, screen: Screen) -> dict[str, Any]:
     return found
 
 
-def _end(session: Session) -> dict[str, Any]:
+def _end(session: Progress) -> dict[str, Any]:
     context, ending = session.context, session.state
     recruitment = context.study.content.recruitment
     is_live = context.store.mode == "live"
     code = recruitment.codes.get(ending) or context.secrets.code(session.participant, ending)
-    url = recruitment.completion_url.replace("{code}", code).replace("{ending}", ending)
-    return {
+    url = recruitment.completion_url.replace("{code}", quote(code, safe="")).replace("{ending}", ending)
+    found = {
         "type": "screen",
         "name": ending,
         "kind": "end",
-        "progress": 1.0 if ending == "complete" else round(session.index / max(1, len(session.screens)), 3),
+        "progress": 1.0 if ending == "complete" else _share(session),
         "html": context.text(ending),
         "ending": ending,
         "code": code,
         "url": url.replace("{participant}", session.participant) if is_live else "",
     }
+    if ending == "device_failed":
+        checks = [json.loads(row["outcome"]) for row in session.visits() if row["kind"] == "device" and row["outcome"]]
+        found["failed"] = checks[-1].get("failed", []) if checks else []
+    return found
+
+
+def _share(session: Progress) -> float:
+    """How much of the study lies behind a participant, 0 to 1."""
+    return round(session.index / max(1, session.index, len(session.screens)), 3)
