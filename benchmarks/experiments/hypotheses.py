@@ -276,7 +276,9 @@ def _less_data(
     some = part[(part["condition"] == treatment) & np.isclose(part["share"], share)]
     whole = part[part["condition"].isin(controls) & np.isclose(part["share"], part["share"].max())]
     table = _balanced(pd.concat([some, whole]), unit, "accuracy")
-    found = compare_conditions(table, value="accuracy", at="mean", design="between", alpha=alpha)
+    # Participants may be the same in all conditions; layouts never are.
+    design: Literal["between", "auto"] = "between" if unit == "layout" else "auto"
+    found = compare_conditions(table, value="accuracy", at="mean", design=design, alpha=alpha)
     means = found.means.set_index("condition")["mean"]
     rows = {}
     for control in controls:

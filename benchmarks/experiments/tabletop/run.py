@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from legible_envs.tabletop.humans.simulation import Person
 
 __all__ = [
+    "covariance_rows",
     "evaluate_predictor",
     "find_table",
     "play_with_robot",
@@ -173,11 +174,23 @@ def trace_learning_curve(trial: dict[str, Any]) -> Rows:
 
 @trial_function(TrialName("tabletop/spread", (f"{_FORMER}:spread_of_reaches",)))
 def spread_of_reaches(trial: dict[str, Any]) -> Rows:
-    """Mean and covariance of the reaches to each goal, step by step.
+    """Mean and covariance of the reaches to each goal, step by step; the rows of :func:`covariance_rows`.
 
     Every participant reaches for every cube once from where they place them, so that the number of reaches behind each
-    covariance is the number of participants, in every condition; and covariances of the same number of steps are taken
-    with and without warping inside the same band. The floor that predictors add is taken off.
+    covariance is the number of participants, in every condition.
+    """
+    return covariance_rows(_balanced_reaches(trial), trial["samples"])
+
+
+def covariance_rows(reaches: Sequence[Trajectory], samples: int) -> Rows:
+    """Mean and covariance of reaches to each goal, step by step.
+
+    Covariances of the same number of steps are taken with and without warping inside the same band. The floor that
+    predictors add is taken off.
+
+    Args:
+        reaches: At one table, two or more to a goal.
+        samples: Steps of a mean reach.
 
     Returns:
         A row per alignment, goal and step: ``time`` (share of the reach), ``x, y`` (mean from the start, metres) and
@@ -185,12 +198,11 @@ def spread_of_reaches(trial: dict[str, Any]) -> Rows:
     """
     from predictors.reaching.gaussian import TimeSeriesGaussian
 
-    reaches = _balanced_reaches(trial)
     rows: Rows = []
     for alignment in ("none", "mean"):
-        fitted = TimeSeriesGaussian(trial["samples"], alignment=alignment).fit(reaches)  # type: ignore[arg-type]
+        fitted = TimeSeriesGaussian(samples, alignment=alignment).fit(reaches)  # type: ignore[arg-type]
         covariances = fitted.covariances_ - np.eye(2) * fitted.floor**2
-        times = np.linspace(0.0, 1.0, trial["samples"])
+        times = np.linspace(0.0, 1.0, samples)
         for goal, count, means, sizes in zip(fitted.goals_, fitted.counts_, fitted.means_, covariances, strict=True):
             for step, (time, mean, size) in enumerate(zip(times, means, sizes, strict=True)):
                 row = {"alignment": alignment, "goal": str(goal), "reaches": int(count), "step": step, "time": time}

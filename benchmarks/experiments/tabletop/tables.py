@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -29,6 +30,7 @@ __all__ = [
     "load_results",
     "metrics_table",
     "spread_beside_published",
+    "spread_summary",
     "spread_table",
     "start_table",
     "team_differences",
@@ -188,20 +190,29 @@ def sizes_of_covariances(spreads: pd.DataFrame) -> pd.DataFrame:
 
 
 def spread_table(results: Results) -> pd.DataFrame:
+    """The rows of :func:`spread_summary` for all conditions."""
+    return spread_summary(results.spreads, CONDITIONS)
+
+
+def spread_summary(spreads: pd.DataFrame, order: Sequence[str]) -> pd.DataFrame:
     """Determinant and trace of covariances by alignment and condition: means over steps, goals and layouts.
 
     ``apart`` is how far mean reaches to two goals are from each other (metres, mean over pairs and steps): what spread
     has to be compared with.
+
+    Args:
+        spreads: Rows of :func:`benchmarks.experiments.tabletop.run.covariance_rows`, with ``condition, layout``.
+        order: Conditions in their order.
     """
     import pandas as pd
 
     rows = []
-    for (alignment, condition), part in sizes_of_covariances(results.spreads).groupby(["alignment", "condition"]):
+    for (alignment, condition), part in sizes_of_covariances(spreads).groupby(["alignment", "condition"]):
         each = part.groupby("layout")[["determinant", "trace"]].mean()
         apart = [_apart(own) for _, own in part.groupby("layout")]
         row = {"alignment": alignment, "condition": condition, **each.mean().to_dict()}
         rows.append(row | {"trace_sd": each["trace"].std(), "apart": float(np.mean(apart))})
-    return in_order(pd.DataFrame(rows), alignment=["none", "mean"], condition=CONDITIONS)
+    return in_order(pd.DataFrame(rows), alignment=["none", "mean"], condition=order)
 
 
 def _apart(part: pd.DataFrame) -> float:

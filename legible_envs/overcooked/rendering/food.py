@@ -13,7 +13,15 @@ from legible_envs.overcooked.game.view import Item
 from legible_envs.overcooked.layout import INGREDIENTS
 from legible_envs.overcooked.rendering.palette import PALETTE
 
-__all__ = ["draw_ingredient", "draw_item", "draw_pieces", "draw_plate", "item_sprite", "places_of_pieces", "soup_colour"]
+__all__ = [
+    "draw_ingredient",
+    "draw_item",
+    "draw_pieces",
+    "draw_plate",
+    "item_sprite",
+    "places_of_pieces",
+    "soup_colour",
+]
 
 
 def _tomato(canvas: Pen, x: float, y: float, r: float) -> None:

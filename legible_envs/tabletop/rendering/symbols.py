@@ -24,8 +24,8 @@ def table_symbols() -> dict[str, str]:
     """What moves on a table as ``<symbol>``, by its id.
 
     Returns:
-        ``t-hand-0`` (open) and ``t-hand-1`` (closed), in the middle of a square whose side is ``2 * HAND_SPAN`` times half
-        the palm's width; ``t-gripper-N`` for each of :data:`OPENINGS`, in the middle of a square whose side is the
+        ``t-hand-0`` (open) and ``t-hand-1`` (closed), in the middle of a square whose side is ``2 * HAND_SPAN`` times
+        half the palm's width; ``t-gripper-N`` for each of :data:`OPENINGS`, in the middle of a square whose side is the
         opening and ``2 * GRIPPER_SPAN`` more.
     """
     drawn: dict[str, str] = {}
@@ -53,8 +53,7 @@ def table_measures() -> dict[str, Any]:
         "colours": dict(TABLE),
         "named": dict(NAMED),
         "glyphs": {
-            name: " ".join(f"{round(x * UNIT)},{round(y * UNIT)}" for x, y in points)
-            for name, points in GLYPHS.items()
+            name: " ".join(f"{round(x * UNIT)},{round(y * UNIT)}" for x, y in points) for name, points in GLYPHS.items()
         },
         "hand_span": HAND_SPAN,
         "gripper_span": GRIPPER_SPAN,

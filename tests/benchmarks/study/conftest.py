@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser
+    from playwright.sync_api import Browser, Page
 
     from benchmarks.study.design.study import Study
 
@@ -35,7 +34,7 @@ def _without(reason: str) -> None:
 
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Browser]:
-    """A Chromium without a window; tests are skipped where there is none, or fail with ``LEGIBLE_REQUIRE_BROWSER=1``."""
+    """A Chromium without a window; without one tests are skipped, or fail with ``LEGIBLE_REQUIRE_BROWSER=1``."""
     try:
         from playwright.sync_api import sync_playwright
     except ImportError:
@@ -50,6 +49,26 @@ def browser() -> Iterator[Browser]:
 
 
 @pytest.fixture
+def open_page(browser: Browser) -> Iterator[Callable[..., Page]]:
+    """Opens pages of contexts of their own; a test fails if a script on one of them did."""
+    contexts, errors = [], []
+
+    def open_one(**options: Any) -> Page:
+        context = browser.new_context(**({"viewport": {"width": 1280, "height": 800}} | options))
+        contexts.append(context)
+        page = context.new_page()
+        page.set_default_timeout(20_000)
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        page.on("console", lambda m: errors.append(m.text) if "Security Policy" in m.text else None)
+        return page
+
+    yield open_one
+    for context in contexts:
+        context.close()
+    assert not errors
+
+
+@pytest.fixture
 def write_study(tmp_path: Path) -> Callable[..., Study]:
     """Writes and loads a small study: ``write_study("overcooked", {"limits.resume": "block"}, files={...})``."""
 
@@ -60,12 +79,3 @@ def write_study(tmp_path: Path) -> Callable[..., Study]:
         return load_study(write_small_study(tmp_path / f"study-{domain}", domain, settings or {}, files or {}))
 
     return write
-
-
-@pytest.fixture
-def serve() -> Iterator[Callable[..., str]]:
-    """Serves a study from a thread until the test ends, and gives its address."""
-    from benchmarks.study.server.run import serving
-
-    with ExitStack() as stack:
-        yield lambda study, **options: stack.enter_context(serving(study, **options))[0]

@@ -15,9 +15,9 @@ KITCHENS = {
 }
 SOUP = ["onion", "onion"]
 # From the start of "practice" and "Baseline": two onions into the pot, a dish, the soup, the serving hatch.
-SMALL_WAY = "W I N I W I N I E E I W N I E N I".split()
+SMALL_WAY = list("WINIWINIEEIWNIENI")
 # From the start of "Legible": one cell farther from the onions to the pot.
-LEGIBLE_WAY = "W I E N I W I E N I E I W N I E N I".split()
+LEGIBLE_WAY = list("WIENIWIENIEIWNIENI")
 ACTIONS = {"N": 0, "S": 1, "E": 2, "W": 3, ".": 4, "I": 5}
 KEYS = {"N": "ArrowUp", "S": "ArrowDown", "E": "ArrowRight", "W": "ArrowLeft", "I": "Space", ".": "Period"}
 BUTTONS = {"N": "north", "S": "south", "E": "east", "W": "west", "I": "interact", ".": "stay"}
@@ -96,22 +96,21 @@ def write_small_study(folder: Path, domain: str, settings: dict[str, Any], files
     return folder
 
 
-def _tables() -> dict[str, str]:
+def small_table(places: str, obstacles: list[dict[str, Any]]) -> str:
+    """The JSON of a table with the cubes in these :data:`PLACES`."""
     import yaml
 
     plain = yaml.safe_load(TASK)
-    found = {}
-    for name, (red, blue) in {**PLACES, "practice": PLACES["Baseline"]}.items():
-        objects = [{**obj, "at": at} for obj, at in zip(plain["objects"], (red, blue), strict=True)]
-        found[name] = json.dumps(
-            {
-                "schema": 1,
-                "table": plain["table"],
-                "objects": objects,
-                "obstacles": [BAR] if name == "Legible" else [],
-            }
-        )
-    return found
+    objects = [{**obj, "at": at} for obj, at in zip(plain["objects"], PLACES[places], strict=True)]
+    return json.dumps({"schema": 1, "table": plain["table"], "objects": objects, "obstacles": obstacles})
+
+
+def _tables() -> dict[str, str]:
+    return {
+        "practice": small_table("Baseline", []),
+        "Baseline": small_table("Baseline", []),
+        "Legible": small_table("Legible", [BAR]),
+    }
 
 
 def _toml(value: Any) -> str:
