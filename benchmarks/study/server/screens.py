@@ -3,19 +3,47 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 from urllib.parse import quote
 
 from benchmarks.study.timeline import GAMES
 
 if TYPE_CHECKING:
-    from benchmarks.study.server.progress import Progress
+    import sqlite3
+
+    from benchmarks.study.games.base import Game
+    from benchmarks.study.server.context import Context
     from benchmarks.study.timeline import Screen
 
-__all__ = ["describe"]
+__all__ = ["Place", "describe"]
 
 
-def describe(session: Progress) -> dict[str, Any]:
+class Place(Protocol):
+    """Where a participant is; see :class:`benchmarks.study.server.progress.Progress`."""
+
+    context: Context
+    participant: str
+    screens: list[Screen]
+    index: int
+    state: str
+    attempt: int
+
+    @property
+    def screen(self) -> Screen | None:
+        """The present screen."""
+
+    @property
+    def game(self) -> Game | None:
+        """The round in play."""
+
+    def gap(self) -> tuple[float | None, float | None]:
+        """When the sitting after a pause can begin."""
+
+    def visits(self) -> list[sqlite3.Row]:
+        """All visits."""
+
+
+def describe(session: Place) -> dict[str, Any]:
     """The message ``screen`` of a session; see :mod:`benchmarks.study.server.protocol`."""
     context, screen = session.context, session.screen
     if screen is None:
@@ -42,7 +70,7 @@ def describe(session: Progress) -> dict[str, Any]:
     return found
 
 
-def _game(session: Progress, screen: Screen) -> dict[str, Any]:
+def _game(session: Place, screen: Screen) -> dict[str, Any]:
     content, game = session.context.study.content, session.game
     conditions = list(
         dict.fromkeys(s.condition for s in session.screens if s.kind == "round" and s.sitting == screen.sitting)
@@ -66,7 +94,7 @@ def _game(session: Progress, screen: Screen) -> dict[str, Any]:
     return found
 
 
-def _end(session: Progress) -> dict[str, Any]:
+def _end(session: Place) -> dict[str, Any]:
     context, ending = session.context, session.state
     recruitment = context.study.content.recruitment
     is_live = context.store.mode == "live"
@@ -88,6 +116,6 @@ def _end(session: Progress) -> dict[str, Any]:
     return found
 
 
-def _share(session: Progress) -> float:
+def _share(session: Place) -> float:
     """How much of the study lies behind a participant, 0 to 1."""
     return round(session.index / max(1, session.index, len(session.screens)), 3)
