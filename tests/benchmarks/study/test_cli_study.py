@@ -62,7 +62,7 @@ def test_orders_and_sittings_are_counted(tmp_path):
         (["new", "{there}/s", "--domain", "overcooked", "--from", "{there}/file"], "no conditions can be taken"),
         (["new", "{there}/file", "--domain", "overcooked"], "where a folder must be"),
         (["check", "{there}/nowhere"], "does not exist"),
-        (["chek", "{there}"], "did you mean check?"),
+        (["chek", "{there}"], "did you mean check or code?"),
     ],
 )
 def test_a_wrong_call_is_one_line_and_exit_code_2(tmp_path, arguments, message):
