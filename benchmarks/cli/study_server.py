@@ -48,7 +48,13 @@ def _base_url(_: click.Context, option: click.Parameter, value: str | None) -> s
 @click.option("--new-design", is_flag=True,
               help="Go on although the design was changed since live participants took part.")  # fmt: skip
 def serve(
-    folder: Path, base_url: str, debug_only: bool, new_design: bool, tls_cert: str | None, tls_key: str | None, **at: Any
+    folder: Path,
+    base_url: str,
+    debug_only: bool,
+    new_design: bool,
+    tls_cert: str | None,
+    tls_key: str | None,
+    **at: Any,
 ) -> None:
     """Serve a study.
 

@@ -85,7 +85,12 @@ class _Bar:
             from rich.console import Console
             from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-            columns = (BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[steps]:,} steps"), TimeElapsedColumn())
+            columns = (
+                BarColumn(),
+                MofNCompleteColumn(),
+                TextColumn("{task.fields[steps]:,} steps"),
+                TimeElapsedColumn(),
+            )
             self._bar = bar = Progress(*columns, console=Console(stderr=True))
             self._task = bar.add_task("participants", total=self._total, steps=0)
             bar.start()

@@ -1,7 +1,7 @@
 """Speed of a study's server: round trips of many participants at once, and what each of them costs.
 
-The server has one core for itself; the participants are connections that send what was prepared before, from a process on
-the other cores, and do no more with the answers than to look at their beginning.
+The server has one core for itself; the participants are connections that send what was prepared before, from a process
+on the other cores, and do no more with the answers than to look at their beginning.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def study_speed(settings: Settings) -> list[Figure]:
     table = tables[0]
     return [
         *figures,
-        Figure("study flat", f"cost of a step, {most.participants} over {few.participants} participants", "x", (ratio,)),
+        Figure("study flat", f"its cost with {most.participants} over {few.participants} participants", "x", (ratio,)),
         Figure("study memory", f"study: memory of the server, {most.participants} participants", "MB",
                (most.memory / 1e6,)),
         Figure("study core", f"study: share of a core, {most.participants} participants", "share",

@@ -1,8 +1,8 @@
 """A study's server is killed (-9) under load: no acknowledged step is lost, and every game goes on where it was.
 
-Each simulated participant keeps its own log of what the server has acknowledged, plays every game on a board of its own,
-and compares the two after every acknowledgement, so also the first after a kill. What a kill of a process cannot show is
-a loss of power: for that the database commits with ``synchronous=FULL`` before a step is acknowledged.
+Each simulated participant keeps its own log of what the server has acknowledged, plays every game on a board of its
+own, and compares the two after every acknowledgement, so also the first after a kill. What a kill of a process cannot
+show is a loss of power: for that the database commits with ``synchronous=FULL`` before a step is acknowledged.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import json
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -32,21 +33,30 @@ PATIENCE = 180.0
 
 
 async def _kill_under_load(
-    study: Study, server: ServerProcess, bots: list[Participant], *, kills: int, at_once: int, rng: np.random.Generator
+    server: ServerProcess,
+    make_bot: Callable[[int], Participant],
+    *,
+    kills: int,
+    at_once: int,
+    rng: np.random.Generator,
 ) -> list[Participant]:
-    """Kill the server so many times while so many bots are at it; the bots that took part, all of them to their end."""
-    waiting, taken, is_over = iter(bots), [], asyncio.Event()
+    """Kill the server so many times while so many bots are in their games; all that took part, all at their end."""
+    taken: list[Participant] = []
+    is_over = asyncio.Event()
 
     async def play() -> None:
         while not is_over.is_set():
-            bot = next(waiting)
+            bot = make_bot(len(taken))
             taken.append(bot)
             await bot.run()
+
+    def playing() -> int:
+        return sum(bot.steps > 0 and not bot.ending for bot in taken)
 
     async def kill() -> None:
         for number in range(kills):
             steps = sum(bot.steps for bot in taken)
-            while sum(bot.steps for bot in taken) == steps:  # somebody plays
+            while playing() < 0.9 * at_once or sum(bot.steps for bot in taken) == steps:
                 await asyncio.sleep(0.005)
             # Some kills come among the first steps after the server is back, when everybody connects again.
             await asyncio.sleep(float(rng.uniform(0, 0.05 if number % 3 == 0 else 1.5)))
@@ -96,10 +106,11 @@ def test_a_killed_server_loses_no_acknowledged_step(domain: str, tmp_path: Path,
     study = load_study(small_study(tmp_path / "study", domain))
     kills, rng = repeats(2, 40), np.random.default_rng(3)
     with ServerProcess(study.folder) as server:
-        bots = [
-            Participant(study, Person(1, n), server.link, keep_log=True, patience=PATIENCE) for n in range(50 * kills)
-        ]
-        bots = asyncio.run(_kill_under_load(study, server, bots, kills=kills, at_once=6, rng=rng))
+
+        def make_bot(number: int) -> Participant:
+            return Participant(study, Person(1, number), server.link, keep_log=True, patience=PATIENCE)
+
+        bots = asyncio.run(_kill_under_load(server, make_bot, kills=kills, at_once=6, rng=rng))
     assert {bot.ending for bot in bots} == {"complete"}
     broken = sum(bot.lost for bot in bots)
     assert broken >= kills, "connections were open when the server died"
@@ -124,11 +135,12 @@ def test_a_server_killed_in_a_storm_of_commits_loses_nothing(tmp_path: Path, rep
     study = load_study(small_study(tmp_path / "study", "overcooked"))
     kills, rng = repeats(1, 5), np.random.default_rng(4)
     with ServerProcess(study.folder) as server:
-        bots = [
-            Participant(study, Person(2, n), server.link, keep_log=True, patience=PATIENCE, leaves_at=(0.3, 40))
-            for n in range(200 * (kills + 5))
-        ]
-        bots = asyncio.run(_kill_under_load(study, server, bots, kills=kills, at_once=200, rng=rng))
+
+        def make_bot(number: int) -> Participant:
+            person = Person(2, number)
+            return Participant(study, person, server.link, keep_log=True, patience=PATIENCE, leaves_at=(0.45, 40))
+
+        bots = asyncio.run(_kill_under_load(server, make_bot, kills=kills, at_once=200, rng=rng))
     assert {bot.ending for bot in bots} == {"left"}
     assert sum(bot.lost for bot in bots) > 100 * kills
     acknowledged, states = _check(study, bots)

@@ -85,7 +85,7 @@ def read_export(folder: Path, *, exclude: Sequence[str] = ()) -> StudyData:
     gone = set(excluded["participant"])
     trajectories = [
         each
-        for path in sorted(folder.glob("trajectories*.npz"))
+        for path in sorted(folder.glob("trajectories*.npz"), key=lambda path: (len(path.name), path.name))
         for each in load_trajectories(path)
         if len(each.candidates) > 1 and each.participant not in gone
     ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sqlite3
+import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -46,7 +47,9 @@ def write_minari(study: Study, connection: sqlite3.Connection, persons: Sequence
         if recorder is None:
             raise ValueError(f"there is no finished round to make the Minari data set {dataset_id!r} of")
         title = f"Rounds of the study {study.content.name!r} (design {study.design_hash}) with human participants."
-        to_minari(recorder, dataset_id, algorithm_name="human participants", description=title)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # that nobody is named as author; participants must not be
+            to_minari(recorder, dataset_id, algorithm_name="human participants", description=title)
         return len(recorder.episodes)
     finally:
         if recorder is not None:
@@ -95,8 +98,8 @@ def _record(
     except ReplayError:
         return  # it is among the problems of the export
     try:
-        recorder.participant, recorder.condition = person.participant, visit.condition
         recorder.reset(seed=visit.seed, options={"layout": game.env.layout})
+        recorder.participant, recorder.condition = person.participant, visit.condition  # of the episode just begun
         for step in steps_of(connection, visit.visit):
             action = game.read_action(json.loads(step.action))
             if study.content.domain == "tabletop":

@@ -95,7 +95,7 @@ def begin(study: Study, person: PersonRow, visits: Sequence[VisitRow], visit: Vi
     try:
         left = reaches_left(study, screen, _earlier(study, person, visits, visit))
         return make_game(study, screen, visit.seed, reaches_left=left)
-    except (KeyError, TypeError, ValueError, OSError) as error:
+    except Exception as error:  # what an environment raises at a damaged row is its own affair
         raise ReplayError(f"the game cannot be made: {error}") from error
 
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from benchmarks.study.design.study import Study
     from benchmarks.study.games.base import Game
 
-__all__ = ["Acknowledged", "Participant", "Pace"]
+__all__ = ["Acknowledged", "Pace", "Participant"]
 
 _BATCH: Final = 30
 """Steps at a table that are told at once when nothing has to look like real time."""
@@ -48,7 +48,6 @@ class Pace:
     factor: float = 0.0
     key: float = 0.2
     screen: float = 4.0
-
 
 
 @dataclass(frozen=True, slots=True)

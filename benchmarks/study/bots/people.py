@@ -1,8 +1,8 @@
 """Simulated people who take part in a study: how each walks or reaches, and every choice they make.
 
-A person is a seed and a number. Whatever they decide comes from generators made of these two and of the screen that they
-are at, so the same person plays a round alike whether a server is in between or not, and in whichever order they meet the
-conditions.
+A person is a seed and a number. Whatever they decide comes from generators made of these two and of the screen that
+they are at, so the same person plays a round alike whether a server is in between or not, and in whichever order they
+meet the conditions.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["POPULATIONS", "Person", "Player", "advance", "make_player"]
 
 POPULATIONS: Final = ("boltzmann", "planner")
-"""How people in kitchens choose their steps; both fitted to recorded participants, as ``legible reproduce`` has them."""
+"""How people in kitchens choose their steps; both fitted to recorded participants, as in ``legible reproduce``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,8 +48,12 @@ class Player(Protocol):
     """Chooses moves in a game."""
 
     def choose(self) -> Any:
-        """The next move: an action 0..5 in a kitchen; at a table the point ``(x, y)`` to which the pointer goes, in
-        metres, rounded to 0.1 mm as a page would tell it."""
+        """The next move.
+
+        Returns:
+            In a kitchen an action 0..5; at a table the point ``(x, y)`` to which the pointer goes, in metres, rounded
+            to 0.1 mm as a page would tell it.
+        """
 
 
 class _Cook:

@@ -163,7 +163,7 @@ def _serve(folder: Path, port: int) -> None:
 
     study = without_gaps(load_study(folder))
     warm_up(study)
-    swift = Pace(messages=1e6, burst=1e6, speed=1e6, joins=1e6)
+    swift = Pace(messages=1e6, burst=1e6, connects=1e6, speed=1e6, joins=1e6)
     server = make_server(study, Address(port=port), modes=("debug",), pace=swift)
 
     def announce() -> None:

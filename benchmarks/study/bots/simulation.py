@@ -1,4 +1,4 @@
-"""Simulated participants through the real server: the server in a process of its own, bots at its socket, rows checked."""
+"""Simulated participants through the real server, which has a process of its own; every row they leave is checked."""
 
 from __future__ import annotations
 

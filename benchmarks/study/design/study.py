@@ -94,6 +94,7 @@ def _checked_draft(folder: Path) -> Draft:
     """
     from benchmarks.study.design.draft import SETTINGS
     from benchmarks.study.design.layout_checks import check_layouts
+    from benchmarks.study.design.partner_checks import check_partners
     from benchmarks.study.design.reading import read_draft
     from benchmarks.study.design.settings_checks import check_settings
     from benchmarks.study.design.text_checks import check_texts
@@ -102,6 +103,7 @@ def _checked_draft(folder: Path) -> Draft:
     check_settings(draft)
     check_texts(draft)
     check_layouts(draft)
+    check_partners(draft)
     draft.problems.sort(key=lambda problem: (problem.file != SETTINGS, problem.file, problem.line))
     return draft
 

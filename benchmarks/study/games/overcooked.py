@@ -121,7 +121,9 @@ class KitchenGame:
             "counters": [
                 [*divmod(cell, width), items[code]] for cell, code in enumerate(state[at_items:at_pots]) if code
             ],
-            "pots": [self._pot(state[i : i + POT_RECORD]) for i in range(at_pots, len(state), POT_RECORD) if state[i] >= 0],
+            "pots": [
+                self._pot(state[i : i + POT_RECORD]) for i in range(at_pots, len(state), POT_RECORD) if state[i] >= 0
+            ],
             "delivered": [recipe for recipe, done in zip(recipes, orders, strict=True) if done == 2],
             "orders": [recipe for recipe, done in zip(recipes, orders, strict=True) if done != 2],
             "crossings": state[CROSSINGS],

@@ -26,7 +26,6 @@ from legible_envs.rollouts.trajectory import Trajectory
 if TYPE_CHECKING:
     from benchmarks.study.design.study import Study
     from benchmarks.study.games.overcooked import KitchenGame
-    from legible_envs.overcooked.layout import OvercookedLayout
 
 __all__ = ["BeliefFollower", "KitchenPredictors", "KitchenWalk"]
 
@@ -49,8 +48,8 @@ class KitchenPredictors:
         self._fitted: dict[str, Any] = {}
         self._lock = threading.Lock()
 
-    def of(self, layout: OvercookedLayout) -> Any:
-        """The predictor of a kitchen.
+    def of(self, game: KitchenGame) -> Any:
+        """The predictor of a kitchen and its soups.
 
         Raises:
             ValueError: There is no such predictor, or it cannot be fitted.
@@ -59,15 +58,17 @@ class KitchenPredictors:
         from legible_envs.overcooked.recipes import soup_task
         from predictors import make_predictor
 
+        layout, soups = game.layout, game.scene()["soups"]
+        key = f"{layout.layout_id} {soups}"
         with self._lock:
-            if layout.layout_id not in self._fitted:
+            if key not in self._fitted:
                 predictor = make_predictor(self._study.content.predictor)
                 if not hasattr(predictor, "classes_"):
-                    task = soup_task(self._study.content.kitchen.soups)
                     rng = np.random.default_rng(0)
-                    predictor = predictor.fit(simulate_participants(layout, _PARTICIPANTS, rng, task=task))
-                self._fitted[layout.layout_id] = predictor
-            return self._fitted[layout.layout_id]
+                    people = simulate_participants(layout, _PARTICIPANTS, rng, task=soup_task(soups))
+                    predictor = predictor.fit(people)
+                self._fitted[key] = predictor
+            return self._fitted[key]
 
 
 class KitchenWalk:
@@ -200,7 +201,7 @@ class BeliefFollower:
     def _goals(self) -> list[dict[str, Any]]:
         if self._walk is not None:
             places: Mapping[str, Any] = self._game.layout.stations
-            belief = self._walk.belief(self._predictors.of(self._game.layout))
+            belief = self._walk.belief(self._predictors.of(self._game))
         else:
             game = self._game.env.game
             places = dict(zip(game.names, game.positions.tolist(), strict=True))

@@ -114,7 +114,8 @@ class _Monitor:
         from starlette.responses import HTMLResponse
 
         content = self.study.content
-        data = {"title": content.title, "domain": content.domain, "theme": content.look.theme}
+        words = dict(self.study.words)
+        data = {"title": content.title, "domain": content.domain, "theme": content.look.theme, "words": words}
         html = pages.page_of("monitor.html.j2", data, title=content.title)
         return HTMLResponse(html, headers={**pages.headers(framed=False), "Cache-Control": "no-store"})
 

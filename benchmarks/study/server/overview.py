@@ -96,8 +96,8 @@ class Overviews:
         ).fetchone()
         steps = 0
         if visit is not None and visit["finished"] is None:
-            top = "SELECT MAX(step) FROM steps WHERE visit = ?"
-            steps = 1 + (database.execute(top, (visit["visit"],)).fetchone()[0] or -1)
+            top = "SELECT COALESCE(MAX(step), -1) FROM steps WHERE visit = ?"
+            steps = 1 + database.execute(top, (visit["visit"],)).fetchone()[0]
         return {
             "participant": participant,
             "state": row["state"],
@@ -148,16 +148,17 @@ class Overviews:
         """Participants of this design by row of the order policy: complete, active, and ended otherwise."""
         found: dict[int, dict[str, Any]] = {}
         sql = (
-            "SELECT order_number, MIN(conditions) AS conditions, COUNT(DISTINCT conditions) AS n, state, COUNT(*) AS c "
-            "FROM participants WHERE design = ? GROUP BY order_number, state"
+            "SELECT order_number, conditions, state, COUNT(*) AS n FROM participants "
+            "WHERE design = ? GROUP BY order_number, conditions, state"
         )
         for row in database.execute(sql, (self._study.design_hash,)):
+            number, conditions = row["order_number"], json.loads(row["conditions"])
             order = found.setdefault(
-                row["order_number"],
-                {"number": row["order_number"], "conditions": [], "complete": 0, "active": 0, "ended": 0},
+                number, {"number": number, "conditions": conditions, "complete": 0, "active": 0, "ended": 0}
             )
-            order["conditions"] = json.loads(row["conditions"]) if row["n"] == 1 else []
-            order[row["state"] if row["state"] in ("complete", "active") else "ended"] += row["c"]
+            if order["conditions"] != conditions:  # orders are drawn
+                order["conditions"] = []
+            order[row["state"] if row["state"] in ("complete", "active") else "ended"] += row["n"]
         return [found[number] for number in sorted(found)]
 
     def _problems(self, database: sqlite3.Connection) -> list[dict[str, Any]]:

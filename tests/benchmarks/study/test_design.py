@@ -365,6 +365,20 @@ def test_a_robot_is_for_tables_only(kitchens):
     assert problem_with(kitchens, "in kitchens there is none").key == "partner"
 
 
+def test_soups_that_cannot_be_told_apart_are_named_once_with_their_setting(kitchens):
+    edit(kitchens, 'soups = [["tomato", "tomato", "onion"]', 'soups = [["fish"]')
+    problem = problem_with(kitchens, "is contained in")
+    assert (problem.key, problem.is_error) == ("kitchen.soups", True)
+    assert check_study(kitchens) == [problem]
+
+
+def test_no_more_reaches_are_wanted_than_can_be_made(tables):
+    edit(tables, "reaches = 8 ", "reaches = 33 ")
+    assert not problem_with(tables, "cannot be made in 4 rounds with 8 objects each").is_error
+    edit(tables, "reaches = 3 ", "reaches = 9 ")
+    assert problem_with(tables, "nobody could finish the practice").key == "practice.reaches"
+
+
 # -- texts, words, questionnaires -------------------------------------------------------------------------------------
 
 

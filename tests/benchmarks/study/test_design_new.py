@@ -128,6 +128,22 @@ def test_the_best_layouts_of_a_reproduction(tmp_path):
     assert starts == {"Random": 2, "Efficient": 1, "Legible-Efficient": 0, "Legible": 1}
 
 
+def test_the_best_tables_of_a_reproduction_are_those_of_the_papers_conditions(tmp_path):
+    for name in ("readings", "curves", "spreads", "teams"):
+        (tmp_path / f"{name}.csv").write_text("table,reader\naccuracy,x\n")
+    layouts = {each.name: each.layout for each in shipped_conditions("tabletop")}
+    other = practice_layout("tabletop").layout
+    rows = [
+        {"condition": condition, "layout": number, "score": 1.0, "objective": objective,
+         "json": layouts.get(condition, other) if number else other}
+        for condition in ("Random", *layouts)
+        for number, objective in enumerate((1.0, 2.0))
+    ]  # fmt: skip
+    pd.DataFrame(rows).to_csv(tmp_path / "layouts.csv", index=False)
+    found = {each.name: TabletopLayout.from_json(each.layout) for each in conditions_of(str(tmp_path), "tabletop")}
+    assert found == {name: TabletopLayout.from_json(text) for name, text in layouts.items()}
+
+
 def test_layout_files_are_conditions_of_their_name(tmp_path):
     (tmp_path / "kitchen one.layout").write_text(
         json.dumps({"grid": KITCHEN, "start_all_orders": [{"ingredients": ["onion"]}]})

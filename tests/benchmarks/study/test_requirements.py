@@ -6,6 +6,7 @@ import contextlib
 import hashlib
 import json
 import sqlite3
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -178,6 +179,8 @@ def test_connects_disconnects_focus_blur_and_visibility_are_rows(tmp_path: Path)
                 page.send("event", kind=kind, at=5)
             page.say("ping", at=1)
         expected = ["joined", "connect", "page_focus", "page_blur", "page_hidden", "page_visible", "page_resize"]
+        while "disconnect" not in server.kinds():
+            time.sleep(0.01)
         assert server.kinds() == [*expected, "page_fullscreen", "disconnect"]
 
 
