@@ -69,6 +69,8 @@ def cook(page: Page, way: Iterable[str], *, touch: bool = False) -> None:
             "!document.querySelector('.count')",
             arg=number,
         )
+        # People act on what they have seen: on the frame after the one in which the step was drawn.
+        page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
 
 def cook_everything(page: Page, *, touch: bool = False) -> None:
