@@ -76,7 +76,9 @@ def table_study(folder: Path, **settings: Any) -> Study:
 
 
 def _study(folder: Path, domain: str, content: Mapping[str, Any], layouts: Mapping[str, str]) -> Study:
-    settings = StudyContent.model_validate({"schema": 1, "name": "probe", "title": "A probe", "domain": domain, **content})
+    settings = StudyContent.model_validate(
+        {"schema": 1, "name": "probe", "title": "A probe", "domain": domain, **content}
+    )
     for path, text in layouts.items():
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_text(text)
@@ -121,7 +123,15 @@ class Recorder:
         self.people = people
         self.answer = answer or _any_answer
 
-    def record(self, number: int, *, until: int | None = None, state: str = "complete", worker: str = "") -> str:
+    def record(
+        self,
+        number: int,
+        *,
+        until: int | None = None,
+        state: str = "complete",
+        worker: str = "",
+        begun_again: Sequence[str] = (),
+    ) -> str:
         """A participant; returns their name.
 
         Args:
@@ -129,6 +139,7 @@ class Recorder:
             until: Screens they get through; None: all.
             state: In which they end.
             worker: Their id on a platform.
+            begun_again: Names of rounds that they play twice, as if the first had been left by a reload.
         """
         study, name = self.study, f"P{number:03d}"
         conditions = study.conditions
@@ -163,6 +174,10 @@ class Recorder:
             if left == 0:
                 continue
             now += 60
+            if screen.name in begun_again:
+                visit = self._visit(name, index, screen, now, int(rng.integers(2**31)))
+                outcome, now = self._play(name, visit, screen, walker, rng, now, left)
+                self._finish(visit, now, outcome | {"restarted": True})
             visit = self._visit(name, index, screen, now, int(rng.integers(2**31)))
             outcome: dict[str, Any] = {}
             if screen.kind in GAMES:
@@ -170,11 +185,7 @@ class Recorder:
                 finished.append((screen, outcome))
             elif screen.kind == "questionnaire":
                 self._answer(name, visit, screen, rng, now)
-            done_at = {"finished": now, "outcome": json.dumps(outcome)}
-            self.connection.execute(
-                "UPDATE visits SET finished = :finished, outcome = :outcome WHERE visit = :visit",
-                done_at | {"visit": visit},
-            )
+            self._finish(visit, now, outcome)
         self.event(name, now, "ended")
         self.connection.commit()
         return name
@@ -205,6 +216,10 @@ class Recorder:
             "begun": now,
         }
         return self._insert("visits", row)
+
+    def _finish(self, visit: int, now: float, outcome: Mapping[str, Any]) -> None:
+        statement = "UPDATE visits SET finished = ?, outcome = ? WHERE visit = ?"
+        self.connection.execute(statement, (now, json.dumps(outcome), visit))
 
     def _play(
         self, name: str, visit: int, screen: Screen, walker: Any, rng: np.random.Generator, now: float, left: int | None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sqlite3
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any, Final
@@ -15,6 +16,7 @@ from benchmarks.study.analysis.redaction import Redaction
 from benchmarks.study.analysis.replaying import game_visits
 from benchmarks.study.analysis.scales import attention, score
 from benchmarks.study.design.study import Study
+from benchmarks.study.store.outcomes import counted_outcome
 from benchmarks.study.timeline import timeline
 
 if TYPE_CHECKING:
@@ -40,7 +42,9 @@ COLUMNS: Final[dict[str, tuple[str, ...]]] = {
     ),
     "steps": (*_PLACE, "step", "action", "vx", "vy", "before", "key_down", "frame_shown", "received"),
     "pointer": (*_PLACE, "sample", "at", "x", "y"),
-    "questionnaires": ("participant", "sitting", "condition", "screen", "visit", "questionnaire", "item", "value", "answered"),
+    "questionnaires": (
+        "participant", "sitting", "condition", "screen", "visit", "questionnaire", "item", "value", "answered",
+    ),
     "scales": ("participant", "sitting", "condition", "questionnaire", "scale", "value", "answered", "items"),
     "events": ("participant", "at", "kind", "detail"),
     "problems": ("participant", "table", "row", "problem"),
@@ -106,8 +110,9 @@ def _counting(visits: Sequence[VisitRow]) -> set[int]:
     """The visits of rounds that were finished, the last of each screen, none that the participant began again."""
     last: dict[int, int] = {}
     for visit in visits:
-        if visit.kind == "round" and visit.finished is not None and '"restarted": true' not in (visit.outcome or ""):
-            last[visit.screen] = visit.visit
+        with suppress(ValueError):  # the row is listed where its game is read
+            if visit.kind == "round" and counted_outcome(visit.finished, visit.outcome) is not None:
+                last[visit.screen] = visit.visit
     return set(last.values())
 
 

@@ -74,10 +74,11 @@ def draw_learning(curves: pd.DataFrame, conditions: Sequence[str], folder: Path)
             low=(table["accuracy"] - table["sd"].fillna(0)).clip(0, 1),
             high=(table["accuracy"] + table["sd"].fillna(0)).clip(0, 1),
         )
+        bands = "bands: one standard deviation between splits" if table["sd"].notna().any() else "of one split"
         figure = learning_curve_figure(
             table,
             title=f"What more trajectories buy: {predictor}",
-            subtitle="mean over fractions observed and participants; bands: one standard deviation between splits",
+            subtitle=f"mean over fractions observed and participants; {bands}",
         )
         files.append(save_figure(folder / f"{slug('learning', predictor)}.svg", figure))
     return files

@@ -135,7 +135,11 @@ def find(
 
 
 def _comparisons(
-    rows: pd.DataFrame, predictors: Sequence[str], conditions: Sequence[str], settings: AnalysisSettings, unsaid: list[str]
+    rows: pd.DataFrame,
+    predictors: Sequence[str],
+    conditions: Sequence[str],
+    settings: AnalysisSettings,
+    unsaid: list[str],
 ) -> dict[str, Comparisons]:
     found = {}
     for predictor in predictors:
@@ -193,16 +197,25 @@ def _work(
     sittings = None
     if len(content.sittings) > 1:
         joined = each.merge(accuracy, on=["participant", "condition", "sitting"], how="left") if len(each) else each
-        known = {"accuracy": f"accuracy of {readings.predictors[0]}" if readings.predictors else "accuracy", **names}
+        known = _with_accuracy(names, readings.predictors)
         parts = [
             long_form(part.assign(condition=part["sitting"]), known).assign(
                 measure=lambda rows, name=condition: name + ": " + rows["measure"]  # type: ignore[misc]
             )
             for condition, part in joined.groupby("condition", sort=False)
         ]
-        table = pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=["participant", "condition", "measure", "value"])
+        table = (
+            pd.concat(parts, ignore_index=True)
+            if parts
+            else pd.DataFrame(columns=["participant", "condition", "measure", "value"])
+        )
         sittings = compare_family(table, [sitting.name for sitting in content.sittings], alpha=settings.alpha)
-    return work, sittings, _trends(study, data, names, accuracy, fixed, settings)
+    return work, sittings, _trends(study, data, names, accuracy, readings.predictors, fixed, settings)
+
+
+def _with_accuracy(names: dict[str, str], predictors: Sequence[str]) -> dict[str, str]:
+    """Names of measures, and that of the column ``accuracy`` before them."""
+    return {"accuracy": f"accuracy of {predictors[0]}" if predictors else "accuracy", **names}
 
 
 def _accuracy_of_people(readings: Readings) -> pd.DataFrame:
@@ -222,6 +235,7 @@ def _trends(
     data: StudyData,
     names: dict[str, str],
     accuracy: pd.DataFrame,
+    predictors: Sequence[str],
     fixed: bool,
     settings: AnalysisSettings,
 ) -> pd.DataFrame:
@@ -233,7 +247,7 @@ def _trends(
     by_position = per_condition(data, domain, fixed_reaches=fixed, by=("sitting", "position"))
     if len(by_position):
         by_position = by_position.merge(accuracy, on=["participant", "condition", "sitting"], how="left")
-    known = {"accuracy": "accuracy of the first predictor", **names}
+    known = _with_accuracy(names, predictors)
     rows += trend_rows(main_rows(study, by_position), "position", known, alpha=settings.alpha)
     if study.content.rounds.per_condition > 1 and not fixed:
         by_round = per_condition(data, domain, fixed_reaches=False, by=("round",))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import json
 import math
 import sqlite3
@@ -76,7 +77,7 @@ def played(
         outcome = game.outcome()
         if is_kitchen:
             cells.append(game.env.view().players[0].cell)
-            outcome["path_length"] = float(sum(a != b for a, b in zip(cells, cells[1:], strict=False)))
+            outcome["path_length"] = float(sum(a != b for a, b in itertools.pairwise(cells)))
         outcome["seconds"] = float(seconds[-1])
         outcome["idle"] = _kitchen_idle(seconds) if is_kitchen else _table_idle(game, steps)
         found = []
@@ -134,8 +135,8 @@ def key_times(steps: Sequence[StepRow], begun: float) -> Floats:
         if part[0] == 0 and steps[0].frame_shown is not None:
             begun = min(float(steps[0].frame_shown) / 1000 + offset, absolute[keyed[0]])
     usual = float(np.median(delays)) if delays else 0.0
-    for i in np.flatnonzero(np.isnan(absolute)):
-        absolute[i] = steps[i].received - usual
+    received = np.array([row.received for row in steps])
+    absolute = np.where(np.isnan(absolute), received - usual, absolute)
     found = np.maximum.accumulate(np.concatenate([[min(begun, absolute[0])], absolute]))
     return np.asarray(found - found[0], dtype=np.float64)
 

@@ -12,6 +12,7 @@ from benchmarks.study.analysis.database import PersonRow, StepRow, VisitRow, peo
 from benchmarks.study.design.study import Study
 from benchmarks.study.games import make_game, reaches_left
 from benchmarks.study.games.base import Game
+from benchmarks.study.store.outcomes import RESTARTED, counted_outcome
 from benchmarks.study.timeline import GAMES, Screen, timeline
 
 __all__ = ["Mismatch", "ReplayError", "Verified", "begin", "game_visits", "play", "replay", "screen_of", "verify"]
@@ -102,11 +103,13 @@ def begin(study: Study, person: PersonRow, visits: Sequence[VisitRow], visit: Vi
 def _earlier(
     study: Study, person: PersonRow, visits: Sequence[VisitRow], visit: VisitRow
 ) -> list[tuple[Screen, dict[str, Any]]]:
-    """The rounds that were finished when a visit began, and what they came to."""
+    """The rounds that had been finished and counted when a visit began, and what they came to."""
     return [
-        (screen_of(study, person, each), each.result)
+        (screen_of(study, person, each), outcome)
         for each in visits
-        if each.kind == "round" and each.finished is not None and each.visit < visit.visit
+        if each.kind == "round"
+        and each.visit < visit.visit
+        and (outcome := counted_outcome(each.finished, each.outcome)) is not None
     ]
 
 
@@ -200,7 +203,7 @@ def compare(
         if visit.finished is None:
             return count, []
         ours, stored = json.loads(json.dumps(game.outcome())), visit.result
-        stored.pop("restarted", None)  # the server's note that the participant began the round again
+        stored.pop(RESTARTED, None)  # the server's note that the participant began the round again
         other = [key for key in {**ours, **stored} if ours.get(key) != stored.get(key)]
         if other:
             told = ", ".join(f"{key} is {ours.get(key)!r}, recorded was {stored.get(key)!r}" for key in sorted(other))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from benchmarks.study.design.questionnaires import answered_names
 from benchmarks.study.games import reaches_left
+from benchmarks.study.store.outcomes import counted_outcome
 from benchmarks.study.timeline import GAMES, Screen, timeline
 
 if TYPE_CHECKING:
@@ -45,11 +46,7 @@ def counted_rounds(screens: Sequence[Screen], visits: Iterable[sqlite3.Row]) -> 
 
 
 def _outcome(visit: sqlite3.Row) -> dict[str, Any] | None:
-    """What a finished visit came to; None where it is not finished, or was begun again."""
-    if visit["finished"] is None:
-        return None
-    found: dict[str, Any] = json.loads(visit["outcome"])
-    return None if found.get("restarted") else found
+    return counted_outcome(visit["finished"], visit["outcome"])
 
 
 def missing(store: Store, study: Study, participant: str) -> list[str]:

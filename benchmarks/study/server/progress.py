@@ -15,6 +15,7 @@ from benchmarks.study.server.play import Play
 from benchmarks.study.server.refusal import Refused
 from benchmarks.study.server.screens import describe
 from benchmarks.study.store import rows
+from benchmarks.study.store.outcomes import counted_outcome
 from benchmarks.study.timeline import GAMES, Ending, Screen, timeline
 
 if TYPE_CHECKING:
@@ -110,7 +111,7 @@ class Progress:
     def _next_attempt(screen: Screen, own: Sequence[sqlite3.Row]) -> int:
         finished = [row for row in own if row["finished"] is not None]
         if screen.kind == "practice":
-            finished = [row for row in finished if not json.loads(row["outcome"]).get("restarted")]
+            finished = [row for row in finished if counted_outcome(row["finished"], row["outcome"]) is not None]
         return 1 + len(finished)
 
     def _counted_rounds(self) -> list[tuple[Screen, dict[str, Any]]]:

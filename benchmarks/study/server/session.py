@@ -17,6 +17,7 @@ from benchmarks.study.server.progress import SEEN, Progress
 from benchmarks.study.server.refusal import Refused
 from benchmarks.study.server.screens import describe
 from benchmarks.study.store import rows
+from benchmarks.study.store.outcomes import RESTARTED
 from benchmarks.study.timeline import GAMES, Screen
 
 if TYPE_CHECKING:
@@ -132,7 +133,7 @@ class Session(Progress):
         elif not is_same_page and limits.resume == "block":
             await self._end("blocked")
         elif not is_same_page and limits.resume == "restart":
-            outcome = {**self.play.game.outcome(), "restarted": True}
+            outcome = {**self.play.game.outcome(), RESTARTED: True}
             await self._write(rows.finish_visit(self.visit, now, outcome))
             self._forget_game()
             self.attempt += screen.kind == "round"  # who reloads in the practice loses no attempt

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from benchmarks.study.analysis.database import StepRow, check_design, people, read_only, visits_of
@@ -16,9 +16,12 @@ from benchmarks.study.analysis.played import key_times, played
 from benchmarks.study.analysis.replaying import game_visits, replay, verify
 from benchmarks.study.analysis.watching import chosen_visits, frames_of, save_frames
 from benchmarks.study.design.study import Study
-from tests.support.recorded_study import kitchen_study, record_study, table_study
+from benchmarks.study.timeline import timeline
+from tests.support.recorded_study import Recorder, kitchen_study, new_database, record_study, table_study
 
 Recorded = tuple[Study, Path]
+unhurried = settings(suppress_health_check=[HealthCheck.too_slow], deadline=None)
+"""The first example may wait for a busy machine, and for Hypothesis to read the loaded sources."""
 
 
 @pytest.fixture(scope="module")
@@ -105,6 +108,24 @@ def test_a_round_that_was_begun_again_is_as_recorded(kitchens: Recorded, tmp_pat
         assert verify(study, connection, people(connection)).mismatches == ()
 
 
+def test_reaches_of_a_round_that_was_begun_again_do_not_count(tmp_path: Path) -> None:
+    study = table_study(tmp_path)
+    path = tmp_path / "data" / "live.sqlite"
+    connection = new_database(path)
+    first = next(screen.name for screen in timeline(study, study.conditions[::-1]) if screen.kind == "round")
+    Recorder(study, connection).record(1, begun_again=[first])
+    connection.close()
+    with read_only(path) as connection:
+        found = verify(study, connection, people(connection))
+        visits = game_visits(visits_of(connection, "P001"))
+    left, *others = [visit for visit in visits if visit.name.rsplit("#", 1)[0] == first.rsplit("#", 1)[0]]
+    assert left.result["restarted"]
+    assert left.result["reaches"] > 0
+    assert sum(visit.result["reaches"] for visit in others) == study.content.rounds.reaches
+    assert found.mismatches == ()
+    assert found.games == len(visits)
+
+
 def test_another_design_is_refused_with_what_to_do(kitchens: Recorded, tmp_path: Path) -> None:
     study, path = kitchens
     changed = _changed(path, tmp_path, "UPDATE participants SET design = 'other' WHERE participant = 'P002'")
@@ -128,6 +149,7 @@ def test_what_is_no_database_is_refused(tmp_path: Path) -> None:
 # -- times ------------------------------------------------------------------------------------------------------------
 
 
+@unhurried
 @given(
     gaps=st.lists(st.floats(0, 5000), min_size=1, max_size=40),
     delays=st.lists(st.floats(0, 0.5), min_size=40, max_size=40),
@@ -144,6 +166,7 @@ def test_times_are_those_of_the_keys_whatever_the_network(gaps: list[float], del
     np.testing.assert_allclose(np.diff(seconds)[1:], np.diff(downs) / 1000, atol=1e-6)
 
 
+@unhurried
 @given(
     downs=st.lists(st.one_of(st.none(), st.floats(0, 1e6)), max_size=30),
     delays=st.lists(st.floats(0, 60), min_size=30, max_size=30),
