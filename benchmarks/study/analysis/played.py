@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from benchmarks.study.games.base import Game
     from legible_envs.rollouts.trajectory import Trajectory
 
-__all__ = ["IDLE_SECONDS", "IDLE_SPEED", "PlayedVisit", "key_times", "named", "played", "setting_name"]
+__all__ = ["IDLE_SECONDS", "IDLE_SPEED", "PlayedVisit", "cell_of_cook", "key_times", "named", "played", "setting_name"]
 
 IDLE_SECONDS: Final = 1.0
 """Kitchens: pauses between keys longer than this are idle time."""
@@ -72,11 +72,11 @@ def played(
             if digest != row.before:
                 raise ReplayError(f"the state before step {row.step} is {digest}, recorded was {row.before}")
             if is_kitchen:
-                cells.append(game.env.view().players[0].cell)
+                cells.append(cell_of_cook(game))
         seconds = key_times(steps, visit.begun) if is_kitchen else np.arange(len(steps) + 1) / 30.0
         outcome = game.outcome()
         if is_kitchen:
-            cells.append(game.env.view().players[0].cell)
+            cells.append(cell_of_cook(game))
             outcome["path_length"] = float(sum(a != b for a, b in itertools.pairwise(cells)))
         outcome["seconds"] = float(seconds[-1])
         outcome["idle"] = _kitchen_idle(seconds) if is_kitchen else _table_idle(game, steps)
@@ -88,6 +88,14 @@ def played(
         return PlayedVisit(visit, seconds, named(found, setting_name(study, visit.condition, visit.sitting)), outcome)
     finally:
         game.close()
+
+
+def cell_of_cook(game: Game) -> int:
+    """Where the participant stands in a kitchen: the number of a cell, from the vector, which a view is slow beside."""
+    from legible_envs.overcooked.game.vectors import AT_PLAYERS
+
+    state = game.env.arrays()[0]
+    return int(state[AT_PLAYERS])
 
 
 def named(trajectories: list[Trajectory], layout_name: str) -> list[Trajectory]:

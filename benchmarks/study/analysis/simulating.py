@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from benchmarks.study.analysis.played import named, setting_name
+from benchmarks.study.analysis.played import cell_of_cook, named, setting_name
 from benchmarks.study.design.study import Study
 from benchmarks.study.games import make_game, reaches_left
 from benchmarks.study.timeline import Screen, timeline
@@ -114,11 +114,11 @@ def _play(study: Study, game: Game, person: Any, rng: np.random.Generator) -> di
     """Play a round to its end; its outcome, of kitchens with the cells walked and the seconds at 0.15 s a step."""
     act, moves = player_of(study, game.env, person, rng), 0
     is_kitchen = study.content.domain == "overcooked"
-    cell = game.env.view().players[0].cell if is_kitchen else None
+    cell = cell_of_cook(game) if is_kitchen else None
     while not game.is_over:
         game.step(game.read_action(np.asarray(act(game.obs, game.info)).tolist()))  # type: ignore[attr-defined]
         if is_kitchen:
-            after = game.env.view().players[0].cell
+            after = cell_of_cook(game)
             moves, cell = moves + (after != cell), after
     outcome = game.outcome()
     if is_kitchen:
