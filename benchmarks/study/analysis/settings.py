@@ -52,11 +52,13 @@ def settings_for(domain: str, *, quick: bool = False, alpha: float = 0.05) -> An
 
         found = AnalysisSettings((*PREDICTORS, NEURAL), alpha=alpha)
     else:
-        from benchmarks.experiments.tabletop.sweep import NEURAL, PREDICTORS
+        from benchmarks.experiments.tabletop.sweep import NEURAL as NEURAL_OF_REACHES
+        from benchmarks.experiments.tabletop.sweep import PREDICTORS as OF_REACHES
 
-        found = AnalysisSettings((*PREDICTORS, NEURAL), share=0.3, shares=(0.3, 0.5, 0.75, 1.0), alpha=alpha)
+        predictors = (*OF_REACHES, NEURAL_OF_REACHES)
+        found = AnalysisSettings(predictors, share=0.3, shares=(0.3, 0.5, 0.75, 1.0), alpha=alpha)
     if quick:
-        found = replace(found, predictors=PREDICTORS, repeats=1, curve_repeats=2, shares=(found.share, 1.0))
+        found = replace(found, predictors=found.predictors[:-1], repeats=1, curve_repeats=2, shares=(found.share, 1.0))
     return found
 
 
