@@ -22,6 +22,9 @@ from benchmarks.cli.options import (
 from benchmarks.cli.program import STOPPED, Commands, Program
 from benchmarks.cli.reproduce import reproduce
 from benchmarks.cli.study import study
+from benchmarks.cli.study_data import DATA_COMMANDS
+from benchmarks.cli.study_server import code, recruit, serve
+from benchmarks.cli.study_simulate import simulate
 from benchmarks.cli.sweep import sweep
 from benchmarks.console import tell
 from legible_envs import __version__
@@ -34,9 +37,13 @@ CONTENTS = {
     "Layouts": ("score", "show", "play"),
     "Participants and predictors": ("humans fetch", "humans stats", "humans evaluate"),
     "Experiments": ("sweep", "reproduce", "bench"),
-    "Studies with people": ("study new", "study check"),
+    "Studies with people": (
+        "study new", "study check", "study simulate", "study serve", "study recruit", "study progress", "study code",
+        "study export", "study analyse", "study power", "study replay", "study verify", "study hand-out",
+        "study forget",
+    ),
     "About": ("demo", "workspaces", "emitters"),
-}
+}  # fmt: skip
 """Sections of ``legible --help``: every command, in order."""
 
 
@@ -73,6 +80,8 @@ def main(traceback: bool) -> None:
 main.add_command(sweep)
 main.add_command(reproduce)
 main.add_command(study)
+for command in (simulate, serve, recruit, code, *DATA_COMMANDS):
+    study.add_command(command)
 
 
 # -- search ------------------------------------------------------------------------------------------------------------

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from benchmarks.study.analysis.report import Analysed
     from benchmarks.study.design.study import Study
 
-__all__ = ["DATA_COMMANDS", "add_to"]
+__all__ = ["DATA_COMMANDS"]
 
 study_folder = click.argument("folder", metavar="STUDY", type=click.Path(exists=True, file_okay=False, path_type=Path))
 debug_option = click.option("--debug", is_flag=True, help="The debug data: of simulate, or of debug links.")
@@ -75,7 +75,7 @@ def _person(connection: Any, participant: str) -> PersonRow:
 def export(
     folder: Path, out: Path, debug: bool, include_incomplete: bool, minari: str | None, design: str | None, quiet: bool
 ) -> None:
-    """Write the data of a study: trajectories, tables and a manifest.
+    """Write trajectories, tables and a manifest of a study.
 
     No worker ids, links or codes are in it. What cannot be read is listed in problems.csv.
     """
@@ -125,7 +125,7 @@ def analyse(
     design: str | None,
     quiet: bool,
 ) -> None:
-    """Make the tables, figures and report of a reproduction of a study's participants.
+    """Make the tables, figures and report of a study.
 
     Writes the export, tables, figures and report.html, and prints what matters most.
     """
@@ -314,7 +314,7 @@ def _print_power(found: Power, measure: str, source: str) -> None:
 @click.option("--out", type=click.Path(path_type=Path), metavar="FILE.gif|FOLDER",
               help="Write a GIF, or PNG files into a folder, instead of opening a window.")  # fmt: skip
 def replay(folder: Path, participant: str, debug: bool, number: int | None, speed: float, out: Path | None) -> None:
-    """Watch a participant's games again, at the times of their keys."""
+    """Watch a participant's games again."""
     from itertools import chain
 
     from benchmarks.study.analysis.database import read_only
@@ -345,7 +345,7 @@ def replay(folder: Path, participant: str, debug: bool, number: int | None, spee
 @design_option
 @quiet_option
 def verify(folder: Path, participants: tuple[str, ...], debug: bool, design: str | None, quiet: bool) -> None:
-    """Play every game again and compare every state with what was recorded.
+    """Play every game again and compare every state.
 
     Exit code 1 if a single one differs: then the study's files, or this package, are not those of the recording.
     """
@@ -379,7 +379,10 @@ def verify(folder: Path, participants: tuple[str, ...], debug: bool, design: str
 @debug_option
 @click.option("--yes", is_flag=True, help="Do not ask.")
 def forget(folder: Path, participant: str, debug: bool, yes: bool) -> None:
-    """Delete everything about a participant, for good; works while the server runs."""
+    """Delete everything about a participant, for good.
+
+    Works while the server runs.
+    """
     from benchmarks.study.analysis.database import read_only
     from benchmarks.study.analysis.person_data import forget as delete
 
@@ -401,7 +404,10 @@ def forget(folder: Path, participant: str, debug: bool, yes: bool) -> None:
 @click.option("--out", type=click.Path(path_type=Path), required=True, metavar="FILE.zip|FOLDER", help="Where to.")
 @debug_option
 def hand_out(folder: Path, participant: str, out: Path, debug: bool) -> None:
-    """Write everything that is stored about one participant, for them to have: who they are among it."""
+    """Write everything that is stored about one participant.
+
+    For them to have: who they are is among it.
+    """
     from benchmarks.study.analysis.person_data import hand_out as write
 
     destination: click.ParamType = DestinationFile(".zip") if out.suffix.lower() == ".zip" else DestinationFolder()
@@ -443,9 +449,3 @@ def progress(folder: Path, out: Path | None, with_worker_ids: bool, debug: bool)
 
 DATA_COMMANDS = (export, analyse, replay, verify, power, forget, hand_out, progress)
 """In the order of ``legible study --help``."""
-
-
-def add_to(group: click.Group) -> None:
-    """Add the commands to a group."""
-    for command in DATA_COMMANDS:
-        group.add_command(command)

@@ -25,6 +25,8 @@ def _shown(value: float, unit: str) -> str:
         return f"{value:,.0f}x" if value >= 100 else f"{value:,.1f}x"
     if unit == "share":
         return f"{value:.0%}"
+    if unit in ("MB", "count"):
+        return f"{value:,.0f} MB" if unit == "MB" else f"{value:,.0f}"
     if value < 0.1:
         return f"{value * 1e6:,.0f} us" if value < 1e-3 else f"{value * 1e3:,.0f} ms"
     return f"{value:,.2f} s"

@@ -20,7 +20,7 @@ class Figure:
     Attributes:
         key: Its name in :data:`benchmarks.throughput.sweep.TARGETS`, or any other.
         what: Its description in tables.
-        unit: ``"/s"``, ``"s"``, ``"x"`` (a ratio) or ``"share"``.
+        unit: ``"/s"``, ``"s"``, ``"x"`` (a ratio), ``"share"``, ``"MB"`` (1e6 bytes) or ``"count"``.
         samples: All measured values; the median is reported.
     """
 

@@ -18,6 +18,7 @@ from benchmarks.throughput.measure import Figure, alternate, rate, sampler
 from benchmarks.throughput.peers import IMITATION, IRL_MAXENT, OVERCOOKED_AI, Peer, opened
 from benchmarks.throughput.predictors_grid import evaluation_speed, prediction_speed, save_problem
 from benchmarks.throughput.predictors_reaching import reach_speed
+from benchmarks.throughput.study import study_speed
 from benchmarks.throughput.sweep import FULL, OPTIMUM_5X5, QUICK, Settings
 from benchmarks.throughput.tabletop import table_drawing, table_games, table_people, table_scoring, table_searching
 
@@ -74,6 +75,7 @@ def run_benchmark(
             ("predicting reaches", lambda: reach_speed(settings)),
             ("predicting in kitchens", lambda: prediction_speed(settings, running, remarks)),
             ("evaluating predictors", lambda: evaluation_speed(settings)),
+            ("a study's server", lambda: study_speed(settings)),
             ("starting", lambda: starting(settings)),
         )
         for name, measure in groups:

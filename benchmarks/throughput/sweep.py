@@ -33,6 +33,9 @@ class Settings:
         table_climbs: Random tables, and climbs, of the searches for tables; by default those of the paper.
         table_episodes: Episodes at tables that are replayed.
         table_people: Simulated participants per call.
+        study_participants: How many play at once at a study's server in kitchens.
+        study_tables: How many at tables with robots.
+        study_seconds: How long.
     """
 
     rounds: int = 7
@@ -52,11 +55,14 @@ class Settings:
     table_climbs: tuple[int, int] = (1_000, 1_000)
     table_episodes: int = 3
     table_people: int = 20
+    study_participants: tuple[int, ...] = (20, 60, 200)
+    study_tables: int = 8
+    study_seconds: float = 20.0
 
 
 FULL: Final = Settings()
 QUICK: Final = Settings(rounds=3, seconds=0.1, oracle_layouts=1, seeds=2, search_evaluations=50_000, fresh_starts=1,
-                        evaluations=1)  # fmt: skip
+                        evaluations=1, study_seconds=5.0)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -105,6 +111,9 @@ TARGETS: Final[dict[str, Target]] = {
     "table env belief": Target(">=", 2_000),
     "table env robot": Target(">=", 2_000),
     "table frames": Target(">=", 60),
+    "study p95 200": Target("<=", 0.020),
+    "study flat": Target("<=", 1.25),
+    "study memory": Target("<=", 300),
     "import": Target("<=", 0.3),
     "compile": Target("<=", 20.0),
 }

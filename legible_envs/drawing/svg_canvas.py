@@ -107,9 +107,9 @@ class SvgCanvas:
         """Part of a ring, from and to in turns clockwise from the top."""
         self.stroke(points_of_arc(x, y, radius, turns), width, colour, opacity)
 
-    def symbol(self, name: str) -> str:
-        """What was drawn as a ``<symbol>`` one unit wide and high, to be shown by ``<use href="#name">``."""
-        return f'<symbol id="{name}" viewBox="0 0 {UNIT} {UNIT}">{"".join(self.elements)}</symbol>'
+    def symbol(self, name: str, tall: float = 1.0) -> str:
+        """What was drawn as a ``<symbol>`` one unit wide and ``tall`` high, to be shown by ``<use href="#name">``."""
+        return f'<symbol id="{name}" viewBox="0 0 {UNIT} {_at(tall)}">{"".join(self.elements)}</symbol>'
 
 
 def _at(length: float) -> int:

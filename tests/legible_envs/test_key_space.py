@@ -57,6 +57,7 @@ def hard_keys(m, rng, n=60):
     return np.concatenate([rng.random((n, m)), corners, edges, rng.normal(0.5, 5.0, (n, m)), equal, huge])
 
 
+@pytest.mark.slow
 @every_design
 def test_genomes_come_back_from_their_keys(workspace):
     space = workspace.continuous()
@@ -72,6 +73,7 @@ def test_genomes_come_back_from_their_keys(workspace):
         np.testing.assert_allclose(back, genomes, rtol=0, atol=1e-14)
 
 
+@pytest.mark.slow
 @every_design
 def test_every_vector_is_a_valid_layout_with_a_score(workspace):
     space = workspace.continuous()

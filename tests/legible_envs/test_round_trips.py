@@ -69,6 +69,7 @@ def test_tasks_survive_with_any_names(tmp_path: Path, name: str) -> None:
     assert TabletopTask.from_yaml(tmp_path / "table.yaml") == task
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(seed=st.integers(0, 2**31), shape=st.tuples(st.integers(5, 9), st.integers(5, 9)))
 def test_kitchens_survive(seed: int, shape: tuple[int, int], tmp_path_factory: pytest.TempPathFactory) -> None:
@@ -77,6 +78,7 @@ def test_kitchens_survive(seed: int, shape: tuple[int, int], tmp_path_factory: p
     survives_as_layout(workspace.decode(genome), tmp_path_factory.mktemp("kitchens"))
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(data=st.data())
 def test_kitchens_without_walls_survive(data: st.DataObject, tmp_path_factory: pytest.TempPathFactory) -> None:

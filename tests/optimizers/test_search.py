@@ -318,6 +318,7 @@ def test_progress_is_quiet_without_a_terminal_and_shown_on_request(capfd):
     assert "climbs" in capfd.readouterr().err
 
 
+@pytest.mark.slow
 def test_history_of_a_long_search_stays_short():
     result = search(SHELF, evaluations=3000, initial=5, emitter_options={"climbs": 1, "fanout": 1})
     assert result.iterations > 2900

@@ -41,6 +41,7 @@ def test_one_climb_is_the_literal_algorithm(condition):
     assert len(literal.evaluated) > 20 + 8 * 6 * ws.phases  # some climbs did take steps
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("condition", CONDITIONS)
 def test_a_search_that_was_stopped_ends_like_one_that_was_not(condition, tmp_path):
     ws = TabletopWorkspace("columns", condition)

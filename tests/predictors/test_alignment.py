@@ -86,6 +86,7 @@ def test_a_wider_band_never_costs_more_and_no_band_costs_least() -> None:
     assert pairwise_costs(np.stack([x, y[:30]]), 3) == pytest.approx(np.array([[0, between], [between, 0]]))
 
 
+@pytest.mark.slow
 def test_averages_under_warping() -> None:
     rng = np.random.default_rng(4)
     way = np.linspace(0, 1, 40)

@@ -89,6 +89,7 @@ def test_rows_say_when_and_whether_rightly() -> None:
     assert list(rule.decide([]).columns) == list(rows.columns)
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(
     values=st.lists(st.sampled_from([0.0, 0.2, 0.5, 0.75, 0.9, 1.0]), min_size=1, max_size=8),

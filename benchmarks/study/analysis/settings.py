@@ -48,15 +48,14 @@ def settings_for(domain: str, *, quick: bool = False, alpha: float = 0.05) -> An
         alpha: Level of all tests and intervals.
     """
     if domain == "overcooked":
-        from benchmarks.experiments.overcooked.sweep import NEURAL, PREDICTORS
+        from benchmarks.experiments.overcooked import sweep as kitchens
 
-        found = AnalysisSettings((*PREDICTORS, NEURAL), alpha=alpha)
+        found = AnalysisSettings((*kitchens.PREDICTORS, kitchens.NEURAL), alpha=alpha)
     else:
-        from benchmarks.experiments.tabletop.sweep import NEURAL as NEURAL_OF_REACHES
-        from benchmarks.experiments.tabletop.sweep import PREDICTORS as OF_REACHES
+        from benchmarks.experiments.tabletop import sweep as tables
 
-        predictors = (*OF_REACHES, NEURAL_OF_REACHES)
-        found = AnalysisSettings(predictors, share=0.3, shares=(0.3, 0.5, 0.75, 1.0), alpha=alpha)
+        own = (*tables.PREDICTORS, tables.NEURAL)
+        found = AnalysisSettings(own, share=0.3, shares=(0.3, 0.5, 0.75, 1.0), alpha=alpha)
     if quick:
         found = replace(found, predictors=found.predictors[:-1], repeats=1, curve_repeats=2, shares=(found.share, 1.0))
     return found

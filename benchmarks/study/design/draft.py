@@ -75,7 +75,7 @@ class Draft:
         wrong = path_problem(self.folder, name)
         if wrong is None:
             try:
-                return read_bounded(self.folder / name, name)
+                return read_bounded(self.folder / name)
             except ValueError as error:
                 self.refuse_file(name, str(error))
                 return None
@@ -118,15 +118,11 @@ def path_problem(folder: Path, name: str) -> str | None:
     return None
 
 
-def read_bounded(path: Path, name: str) -> str:
+def read_bounded(path: Path) -> str:
     """The text of a file of bounded size.
 
-    Args:
-        path: The file.
-        name: What messages call it.
-
     Raises:
-        ValueError: It is larger, cannot be read, or is not text; says so without the name, but for the line.
+        ValueError: It is larger, cannot be read, or is not text; says so without the name.
     """
     try:
         with path.open("rb") as stream:
@@ -135,4 +131,4 @@ def read_bounded(path: Path, name: str) -> str:
         raise ValueError(f"it cannot be read: {error.strerror or error}") from error
     if len(data) > MOST_BYTES:
         raise ValueError(f"it has more than {MOST_BYTES:,} bytes, the most that is read")
-    return decode_text(data, name)
+    return decode_text(data, "the file")

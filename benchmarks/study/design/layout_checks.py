@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from benchmarks.study.design.draft import SETTINGS, Draft
+from benchmarks.study.design.partner_checks import task_of
 from legible_envs.errors import LayoutError
 
 if TYPE_CHECKING:
@@ -25,14 +26,17 @@ Path = tuple[str | int, ...]
 
 
 def check_layouts(draft: Draft) -> None:
-    """Note layouts that cannot be played, predictors and partners that are unknown, and files that nothing uses."""
-    task = _task_of(draft) if draft.content.domain == "tabletop" else None
+    """Note layouts that cannot be played, and files that nothing uses."""
+    task = _checked_task(draft) if draft.content.domain == "tabletop" else None
+    if draft.content.domain == "overcooked":
+        _check_soups(draft)
+    elif task is not None:
+        _check_reaches(draft, task)
     for number, entry in enumerate(draft.content.conditions):
         _check_layout(draft, entry.layout, ("conditions", number, "layout"), f"condition {entry.name!r}", task)
     if draft.content.practice is not None:
         _check_layout(draft, draft.content.practice.layout, ("practice", "layout"), "the practice", task)
     _check_repeated(draft)
-    _check_predictors(draft)
     _check_unused(draft)
 
 
@@ -42,8 +46,7 @@ def _check_layout(draft: Draft, file: str, path: Path, what: str, task: Tabletop
         return  # said elsewhere
     try:
         if task is None:
-            soups = draft.content.practice.soups if path[0] == "practice" else draft.content.kitchen.soups  # type: ignore[union-attr]
-            _check_kitchen(draft, file, text, soups)
+            _check_kitchen(draft, file, text, _soups_of(draft, is_practice=path[0] == "practice"))
         else:
             _check_table(draft, text, task)
     except (LayoutError, ValueError) as error:
@@ -52,6 +55,31 @@ def _check_layout(draft: Draft, file: str, path: Path, what: str, task: Tabletop
 
 
 # -- kitchens ----------------------------------------------------------------------------------------------------------
+
+
+def _soups_of(draft: Draft, *, is_practice: bool) -> list[list[str]]:
+    """What is cooked; one onion where that itself is wrong, so that the layout is checked all the same."""
+    practice = draft.content.practice
+    soups = practice.soups if is_practice and practice is not None else draft.content.kitchen.soups
+    return soups if _soups_problem(soups) is None else [["onion"]]
+
+
+def _soups_problem(soups: list[list[str]]) -> str | None:
+    from legible_envs.overcooked.recipes import check_recipes
+
+    try:
+        check_recipes(soups)
+    except ValueError as error:
+        return str(error)
+    return None
+
+
+def _check_soups(draft: Draft) -> None:
+    practice = draft.content.practice
+    asked = {"kitchen": draft.content.kitchen.soups} | ({} if practice is None else {"practice": practice.soups})
+    for table, soups in asked.items():
+        if (wrong := _soups_problem(soups)) is not None:
+            draft.refuse(f"`{table}.soups`: {wrong}", table, "soups")
 
 
 def _check_kitchen(draft: Draft, file: str, text: str, soups: list[list[str]]) -> None:
@@ -87,22 +115,32 @@ def _as_played(draft: Draft, layout: Any, bare: Any) -> list[Any]:
 # -- tables ------------------------------------------------------------------------------------------------------------
 
 
-def _task_of(draft: Draft) -> TabletopTask | None:
-    from legible_envs.tabletop.task import TabletopTask, read_task
-
-    name = draft.content.table.task
+def _checked_task(draft: Draft) -> TabletopTask | None:
     try:
-        if name.endswith((".yaml", ".yml")):
-            if not draft.task:
-                return None  # said elsewhere
-            from legible_envs.support.plain_data import parse_yaml
-
-            return TabletopTask.from_dict(parse_yaml(draft.task))
-        task = read_task(name)
+        return task_of(draft)
     except ValueError as error:
         draft.refuse(f"`table.task`: {error}", "table", "task")
         return None
-    return task
+
+
+def _check_reaches(draft: Draft, task: TabletopTask) -> None:
+    """Warn where more reaches are wanted than a participant can make; a robot makes some of them, too."""
+    content, objects = draft.content, len(task.graph.goals)
+    shared = "; the robot takes some of them, too" if content.partner is not None else ""
+    most = objects * content.rounds.per_condition
+    if content.rounds.reaches > most:
+        draft.refuse(
+            f"{content.rounds.reaches} reaches cannot be made in {content.rounds.per_condition} rounds with {objects} "
+            f"objects each{shared}: the condition ends after its rounds",
+            *("rounds", "reaches"),
+            warn=True,
+        )
+    if content.practice is not None and content.practice.reaches > objects:
+        draft.refuse(
+            f"{content.practice.reaches} reaches cannot be made with {objects} objects{shared}: nobody could finish "
+            "the practice",
+            *("practice", "reaches"),
+        )
 
 
 def _check_table(draft: Draft, text: str, task: TabletopTask) -> None:
@@ -158,72 +196,12 @@ def _check_repeated(draft: Draft) -> None:
         seen.setdefault(text, entry.name)
 
 
-def _check_predictors(draft: Draft) -> None:
-    content = draft.content
-    if content.domain == "overcooked":
-        _check_kitchen_predictor(draft)
-        return
-    _check_table_predictor(draft, content.predictor, "predictor")
-    partner = content.partner
-    if partner is None:
-        return
-    if partner.kind == "robot":
-        _check_table_predictor(draft, partner.predictor, "partner", "predictor")
-    else:
-        from legible_envs.tabletop.partner.team import make_partner
-
-        try:
-            make_partner(partner.kind, None, partner.threshold)
-        except (ValueError, TypeError) as error:
-            draft.refuse(f"`partner.kind`: {error}", "partner", "kind")
-    task = _quiet_task(draft)
-    if task is not None and not task.configuration:
-        draft.refuse(
-            f"a robot puts objects in their places in the configuration; the task {task.name!r} has none", "partner"
-        )
-
-
-def _quiet_task(draft: Draft) -> TabletopTask | None:
-    """The task, whose problems are said elsewhere."""
-    known = len(draft.problems)
-    task = _task_of(draft)
-    del draft.problems[known:]
-    return task
-
-
-def _check_kitchen_predictor(draft: Draft) -> None:
-    from predictors.registry import PredictorError, list_predictors, make_predictor
-
-    name = draft.content.predictor
-    try:
-        make_predictor(name)
-    except PredictorError as error:
-        draft.refuse(f"`predictor`: {error}", "predictor")
-        return
-    known = list_predictors().get(name)
-    if known is not None and known.target.startswith("predictors.reaching"):
-        draft.refuse(f"`predictor`: {name!r} predicts reaches at tables, not where cooks go", "predictor")
-
-
-def _check_table_predictor(draft: Draft, name: str, *path: str) -> None:
-    from legible_envs.tabletop.partner.intent import make_intent_predictor
-    from predictors.registry import list_predictors
-
-    try:
-        make_intent_predictor(name)
-    except (ValueError, TypeError) as error:
-        draft.refuse(f"`{'.'.join(path)}`: {error}", *path)
-        return
-    known = list_predictors().get(name)
-    if known is not None and name != "bayesian" and known.target.startswith("predictors.grid"):
-        draft.refuse(f"`{'.'.join(path)}`: {name!r} predicts where cooks go, not reaches at tables", *path)
-
-
 def _check_unused(draft: Draft) -> None:
-    place = draft.folder / "layouts"
+    place, practice = draft.folder / "layouts", draft.content.practice
+    used = {entry.layout for entry in draft.content.conditions} | ({practice.layout} if practice is not None else set())
     if not place.is_dir() or not place.resolve().is_relative_to(draft.folder.resolve()):
         return
     for entry in sorted(place.iterdir()):
         name = f"layouts/{entry.name}"
-        if entry.is_file() and not entry.name.startswith(".") and entry.suffix != ".md" and name not in draft.layouts:
+        if entry.is_file() and not entry.name.startswith(".") and entry.suffix != ".md" and name not in used:
             draft.refuse_file(name, f"nothing in {SETTINGS} uses this file", warn=True)

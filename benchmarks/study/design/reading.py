@@ -40,12 +40,13 @@ def _read_settings(folder: Path) -> tuple[str, StudyContent]:
     if wrong is not None:
         raise _error(folder, [Problem(SETTINGS, f"{wrong}; expected the settings of a study")])
     try:
-        source = read_bounded(folder / SETTINGS, SETTINGS)
+        source = read_bounded(folder / SETTINGS)
         data = parse_toml(source)
     except ValueError as error:
         raise _error(folder, [Problem(SETTINGS, str(error), line=_line_in(str(error)))]) from error
     if found := problems_of(StudyContent, data, SETTINGS):
-        raise _error(folder, [problem_at(SETTINGS, source, path, message) for path, message in found])
+        problems = [problem_at(SETTINGS, source, path, message) for path, message in found]
+        raise _error(folder, sorted(problems, key=lambda problem: problem.line))
     return source, validated(StudyContent, data, SETTINGS)
 
 
@@ -77,10 +78,12 @@ def _read_texts(draft: Draft) -> None:
 
 
 def _read_words(draft: Draft) -> None:
+    """The words of the study; in English, those of the package for what it does not say."""
     file = f"{draft.content.texts}/words.toml"
-    if is_english(draft.content) and not (draft.folder / file).exists():
-        draft.words = default_words()
-        return
+    if is_english(draft.content):
+        draft.words = dict(default_words())
+        if not (draft.folder / file).exists():
+            return
     source = draft.read(file, "the short texts of the page")
     if source is None:
         return

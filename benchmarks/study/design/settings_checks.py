@@ -131,9 +131,7 @@ def _check_sittings(draft: Draft) -> None:
 
 
 def _check_orders(draft: Draft) -> None:
-    names = [entry.name for entry in draft.content.conditions]
-    if len({name.casefold() for name in names}) < len(names):
-        return  # said elsewhere
+    names = list(dict.fromkeys(entry.name for entry in draft.content.conditions))
     try:
         policy = make_policy(draft.content.orders.policy, names)
     except StudyError as error:

@@ -7,8 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from benchmarks.study.design.models import ConditionEntry
 from benchmarks.study.design.package_files import list_files, read_file
 from benchmarks.study.errors import StudyError
+from legible_envs.support.models import problems_of
 
 if TYPE_CHECKING:
     from optimizers import SearchResult
@@ -187,13 +189,15 @@ def all_conditions(sources: Sequence[str], domain: str) -> list[NewCondition]:
     """The conditions of all sources, those of the package where there are none.
 
     Raises:
-        StudyError: A source gives none, or two conditions have one name.
+        StudyError: A source gives none, two conditions have one name, or a name cannot be one.
     """
     if not sources:
         return shipped_conditions(domain)
     found = [condition for source in sources for condition in conditions_of(source, domain)]
     files: dict[str, str] = {}
     for condition in found:
+        for _, message in problems_of(ConditionEntry, {"name": condition.name, "layout": condition.file(domain)}):
+            raise StudyError(f"a condition cannot be called {condition.name!r}: {message}; name it: NAME=PATH")
         if (before := files.get(condition.file(domain))) is not None:
             raise StudyError(f"two conditions are called {before!r} and {condition.name!r}; name one: NAME=PATH")
         files[condition.file(domain)] = condition.name

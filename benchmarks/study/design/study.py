@@ -81,10 +81,9 @@ def load_study(folder: str | Path) -> Study:
 def check_study(folder: str | Path) -> list[Problem]:
     """Everything that is missing or wrong in a study's folder, and what a researcher should know, by file and line."""
     try:
-        problems = _checked_draft(Path(folder)).problems
+        return _checked_draft(Path(folder)).problems
     except StudyError as error:
-        problems = list(error.problems)
-    return sorted(problems, key=lambda problem: (problem.file != "study.toml", problem.file, problem.line))
+        return list(error.problems)
 
 
 def _checked_draft(folder: Path) -> Draft:
@@ -93,7 +92,9 @@ def _checked_draft(folder: Path) -> Draft:
     Raises:
         StudyError: Not even its settings can be read.
     """
+    from benchmarks.study.design.draft import SETTINGS
     from benchmarks.study.design.layout_checks import check_layouts
+    from benchmarks.study.design.partner_checks import check_partners
     from benchmarks.study.design.reading import read_draft
     from benchmarks.study.design.settings_checks import check_settings
     from benchmarks.study.design.text_checks import check_texts
@@ -102,6 +103,8 @@ def _checked_draft(folder: Path) -> Draft:
     check_settings(draft)
     check_texts(draft)
     check_layouts(draft)
+    check_partners(draft)
+    draft.problems.sort(key=lambda problem: (problem.file != SETTINGS, problem.file, problem.line))
     return draft
 
 

@@ -15,7 +15,7 @@ __all__ = ["check_texts"]
 _LONGEST: Final = 100_000
 _LONGEST_WORD: Final = 1000
 _PLACEHOLDER: Final = re.compile(r"(?<![!\\\]])\[([^\[\]\n]+)\](?![(\[:])")
-_HTML: Final = re.compile(r"<(?:/?[A-Za-z][A-Za-z0-9-]*(?:\s[^<>]*)?/?|!--.*?--)>", re.DOTALL)
+_HTML: Final = re.compile(r"<(?:/?[A-Za-z][A-Za-z0-9-]*(?:\s[^<>]*)?/?>|!--)")
 _PICTURE: Final = re.compile(r"!\[[^\]]*\]\(")
 _VALUE: Final = re.compile(r"\{(\w*)\}")
 

@@ -21,7 +21,9 @@ class Game(Protocol):
 
     env: Any
     steps: int
-    is_over: bool
+
+    @property
+    def is_over(self) -> bool: ...  # noqa: D102  (see above)
 
     def read_action(self, value: object) -> Any:
         """An action as it is stored and given to :meth:`step`, from what the page sent.

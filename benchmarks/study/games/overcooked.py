@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from legible_envs.overcooked.env import OvercookedEnv
-from legible_envs.overcooked.game.view import Item
+from legible_envs.overcooked.game.vectors import AT_ITEMS, AT_ORDERS, AT_PLAYERS, AT_POTS, CROSSINGS, POT_RECORD
+from legible_envs.overcooked.layout import INGREDIENTS
 from legible_envs.overcooked.layouts import read_layout
 from legible_envs.overcooked.settings import NUM_ACTIONS
 
@@ -58,6 +59,11 @@ class KitchenGame:
         self.steps = 0
         self.finished = False
         self.obs, self.info = self.env.reset(seed=seed)
+        rules, self._cook_time = self.env.arrays()[2], cook_time
+        self._places = tuple(int(rules[at]) for at in (AT_ORDERS, AT_ITEMS, AT_POTS))
+        self._recipes = [list(recipe) for recipe in self.env.settings.rules.recipes]
+        self._items: list[list[Any] | None] = [None, *([kind, []] for kind in (*INGREDIENTS, "dish"))]
+        self._items += [["soup", recipe] for recipe in self._recipes]
 
     @property
     def is_over(self) -> bool:
@@ -101,23 +107,33 @@ class KitchenGame:
             ``pots`` (``[row, col, contents, ticks, cook_time, status]`` with status 0 open, 1 cooking, 2 ready),
             ``delivered`` and ``orders`` (lists of soups), ``crossings``. An item is ``[kind, contents]`` or None.
         """
-        view = self.env.view()
+        # Straight from the vector, not by `env.view()`: a server does this for every key of every participant.
+        state, width, items = self.env.arrays()[0].tolist(), self.layout.shape[1], self._items
+        at_orders, at_items, at_pots = self._places
+        orders, recipes = state[at_orders:at_items], self._recipes
         return {
             "n": self.steps,
             "over": self.is_over,
             "players": [
-                {"cell": list(player.cell), "facing": player.facing, "held": _item(player.held)}
-                for player in view.players
+                {"cell": list(divmod(state[i], width)), "facing": state[i + 1], "held": items[state[i + 2]]}
+                for i in range(AT_PLAYERS, at_orders, 3)
             ],
-            "counters": [[row, col, _item(item)] for (row, col), item in view.counters.items()],
+            "counters": [
+                [*divmod(cell, width), items[code]] for cell, code in enumerate(state[at_items:at_pots]) if code
+            ],
             "pots": [
-                [row, col, list(pot.contents), pot.ticks, pot.cook_time, 2 if pot.is_ready else int(pot.is_cooking)]
-                for (row, col), pot in view.pots.items()
+                self._pot(state[i : i + POT_RECORD]) for i in range(at_pots, len(state), POT_RECORD) if state[i] >= 0
             ],
-            "delivered": [list(recipe) for recipe in view.delivered],
-            "orders": [list(recipe) for recipe in view.orders],
-            "crossings": view.crossings,
+            "delivered": [recipe for recipe, done in zip(recipes, orders, strict=True) if done == 2],
+            "orders": [recipe for recipe, done in zip(recipes, orders, strict=True) if done != 2],
+            "crossings": state[CROSSINGS],
         }
+
+    def _pot(self, record: list[int]) -> list[Any]:
+        cell, *counts, ticks, order = record
+        contents = [kind for kind, count in zip(INGREDIENTS, counts, strict=True) for _ in range(count)]
+        status = 0 if order < 0 else 2 if ticks >= self._cook_time else 1
+        return [*divmod(cell, self.layout.shape[1]), contents, ticks, self._cook_time, status]
 
     def outcome(self) -> dict[str, Any]:
         """``steps, finished, done`` (soups delivered), ``crossings``."""
@@ -150,7 +166,3 @@ class KitchenGame:
 def without_obstacles(layout: OvercookedLayout) -> OvercookedLayout:
     """The same kitchen with floor in place of virtual obstacles."""
     return read_layout(layout.to_ascii().replace("V", " "))
-
-
-def _item(item: Item | None) -> list[Any] | None:
-    return None if item is None else [item.kind, list(item.contents)]

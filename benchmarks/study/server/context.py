@@ -25,14 +25,22 @@ class Pace:
     Attributes:
         messages: A second, in the long run.
         burst: At once.
+        events: Of a page's own events and of refusals, a second in the long run; more are not kept.
+        event_burst: Of these at once.
+        connects: Of a participant, a second in the long run; 20 at once.
         speed: How much faster than real time the pointer's clock may go (bots play faster than people).
         joins: New participants a second, from everywhere.
+        connections: Open at a time, of everybody together.
     """
 
     messages: float = 60.0
     burst: float = 240.0
+    events: float = 2.0
+    event_burst: float = 60.0
+    connects: float = 0.5
     speed: float = 1.05
     joins: float = 20.0
+    connections: int = 2000
 
 
 @dataclass

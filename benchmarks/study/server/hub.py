@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
+from collections import Counter
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
@@ -11,7 +13,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from benchmarks.study.orders import next_order
+from benchmarks.study.server.rates import Bucket
 from benchmarks.study.server.recruitment import is_open, worker_of
+from benchmarks.study.server.refusal import Gone
 from benchmarks.study.server.secrets import fingerprint
 from benchmarks.study.server.session import Session
 from benchmarks.study.store import rows
@@ -24,6 +28,8 @@ __all__ = ["Connection", "Hub", "NotAdmitted"]
 
 _LETTER: Final = {"live": "P", "debug": "D"}
 _MINUTE: Final = 60.0
+_PATIENCE: Final = 2.0
+"""Seconds that a new page waits for the older one to be told."""
 
 
 class NotAdmitted(Exception):
@@ -40,13 +46,13 @@ class Connection:
 
     Attributes:
         send: Sends it a message.
-        close: Ends the connection.
+        close: Ends the connection, with a code.
         since: Seconds since 1970.
         heard: When it last said something that is a sign of life.
     """
 
     send: Callable[[Mapping[str, Any]], Awaitable[None]]
-    close: Callable[[], Awaitable[None]]
+    close: Callable[[int], Awaitable[None]]
     since: float
     heard: float
 
@@ -68,6 +74,8 @@ class Hub:
         self.sessions: dict[str, Session] = {}
         self.connections: dict[str, Connection] = {}
         self.watchers: set[Callable[[str, Mapping[str, Any]], None]] = set()
+        self._pages: Counter[str] = Counter()
+        self._connects: dict[str, Bucket] = {}
         self._joining = asyncio.Lock()
 
     # -- joining ------------------------------------------------------------------------------------------------------
@@ -102,14 +110,15 @@ class Hub:
         if not worker.worker:
             return None
         found = self.context.store.read(
-            "SELECT participant, state FROM workers JOIN participants USING (participant) "
+            "SELECT participant, state, design FROM workers JOIN participants USING (participant) "
             "WHERE source = ? AND worker = ? ORDER BY workers.joined DESC LIMIT 1",
             (worker.source, worker.worker),
         )
         if not found:
             return None
         once = self.context.study.content.recruitment.one_per_worker
-        return str(found[0]["participant"]) if once or found[0]["state"] == "active" else None
+        goes_on = found[0]["state"] == "active" and found[0]["design"] == self.context.study.design_hash
+        return str(found[0]["participant"]) if once or goes_on else None
 
     async def _add(self, worker: Worker) -> str:
         context, now = self.context, self.context.now()
@@ -154,8 +163,8 @@ class Hub:
 
     # -- sessions and pages -------------------------------------------------------------------------------------------
 
-    def session_of(self, token: str) -> Session | None:
-        """The session that a token opens; None where it opens none."""
+    def enter(self, token: str) -> Session | None:
+        """The session that a token opens, kept until :meth:`leave`; None where it opens none."""
         found = self.context.store.read(
             "SELECT participant FROM participants WHERE token_sha256 = ?", (fingerprint(token),)
         )
@@ -164,21 +173,41 @@ class Hub:
         participant = str(found[0]["participant"])
         if participant not in self.sessions:
             self.sessions[participant] = Session(self.context, participant)
+        self._pages[participant] += 1
         return self.sessions[participant]
+
+    def leave(self, session: Session) -> None:
+        """A connection is done with a session; after its last one it is forgotten until somebody comes back."""
+        self._pages[session.participant] -= 1
+        if not self._pages[session.participant]:
+            del self._pages[session.participant]
+            del self.sessions[session.participant]
+
+    def may_connect(self, participant: str) -> bool:
+        """Whether a participant does not connect all the time."""
+        if participant not in self._connects:
+            self._connects[participant] = Bucket(self.context.pace.connects, 20)
+        return self._connects[participant].take()
 
     async def attach(self, session: Session, connection: Connection) -> None:
         """Make a page the one of its participant; an older one is told and closed."""
         older = self.connections.get(session.participant)
         self.connections[session.participant] = connection
         if older is not None:
-            await older.send({"type": "replaced"})
-            await older.close()
+            # Its socket may be one that nobody reads.
+            with contextlib.suppress(TimeoutError, Gone):
+                async with asyncio.timeout(_PATIENCE):
+                    await older.send({"type": "replaced"})
+                    await older.close(4409)
+
+    def is_newest(self, session: Session, connection: Connection) -> bool:
+        """Whether a page is the one that its participant has now."""
+        return self.connections.get(session.participant) is connection
 
     def detach(self, session: Session, connection: Connection) -> None:
-        """The page is gone. A participant who has ended is forgotten until they come back."""
-        if self.connections.get(session.participant) is connection:
+        """The page is gone."""
+        if self.is_newest(session, connection):
             del self.connections[session.participant]
-            self.sessions.pop(session.participant, None)
 
     def told(self, participant: str, message: Mapping[str, Any]) -> None:
         """Let those who watch know what a page was told."""

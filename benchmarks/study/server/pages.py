@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 if TYPE_CHECKING:
     from benchmarks.study.server.context import Context
 
-__all__ = ["HEADERS", "KINDS", "asset", "page_of", "participant_page"]
+__all__ = ["KINDS", "asset", "headers", "page_of", "participant_page"]
 
 KINDS: Final = {
     ".css": "text/css; charset=utf-8",
@@ -27,7 +27,7 @@ _POLICY: Final = (
 )
 
 
-def HEADERS(*, framed: bool) -> dict[str, str]:
+def headers(*, framed: bool) -> dict[str, str]:
     """Headers of a response.
 
     Args:
@@ -39,6 +39,7 @@ def HEADERS(*, framed: bool) -> dict[str, str]:
         "Referrer-Policy": "no-referrer",
         "Permissions-Policy": "camera=(), microphone=(), geolocation=(), payment=(), usb=()",
         "Cross-Origin-Opener-Policy": "same-origin",
+        "Cross-Origin-Resource-Policy": "same-origin",
     }
 
 
@@ -61,7 +62,7 @@ def page_of(name: str, data: Mapping[str, Any], **values: Any) -> str:
     from markupsafe import Markup
 
     text = json.dumps(data, allow_nan=False).replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
-    return str(_template(name).render(study_json=Markup(text), **values))
+    return str(_template(name).render(study_json=Markup(text), data=data, **values))
 
 
 def participant_page(context: Context, *, reason: str = "") -> str:

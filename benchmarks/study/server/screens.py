@@ -2,18 +2,48 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import json
+from typing import TYPE_CHECKING, Any, Protocol
+from urllib.parse import quote
 
 from benchmarks.study.timeline import GAMES
 
 if TYPE_CHECKING:
-    from benchmarks.study.server.session import Session
+    import sqlite3
+
+    from benchmarks.study.games.base import Game
+    from benchmarks.study.server.context import Context
     from benchmarks.study.timeline import Screen
 
-__all__ = ["describe"]
+__all__ = ["Place", "describe"]
 
 
-def describe(session: Session) -> dict[str, Any]:
+class Place(Protocol):
+    """Where a participant is; see :class:`benchmarks.study.server.progress.Progress`."""
+
+    context: Context
+    participant: str
+    screens: list[Screen]
+    index: int
+    state: str
+    attempt: int
+
+    @property
+    def screen(self) -> Screen | None:
+        """The present screen."""
+
+    @property
+    def game(self) -> Game | None:
+        """The round in play."""
+
+    def gap(self) -> tuple[float | None, float | None]:
+        """When the sitting after a pause can begin."""
+
+    def visits(self) -> list[sqlite3.Row]:
+        """All visits."""
+
+
+def describe(session: Place) -> dict[str, Any]:
     """The message ``screen`` of a session; see :mod:`benchmarks.study.server.protocol`."""
     context, screen = session.context, session.screen
     if screen is None:
@@ -22,7 +52,7 @@ def describe(session: Session) -> dict[str, Any]:
         "type": "screen",
         "name": screen.name,
         "kind": screen.kind,
-        "progress": round(session.index / max(1, len(session.screens)), 3),
+        "progress": _share(session),
         "html": context.text(screen.text) if screen.text else "",
     }
     if screen.kind == "device":
@@ -40,7 +70,7 @@ def describe(session: Session) -> dict[str, Any]:
     return found
 
 
-def _game(session: Session, screen: Screen) -> dict[str, Any]:
+def _game(session: Place, screen: Screen) -> dict[str, Any]:
     content, game = session.context.study.content, session.game
     conditions = list(
         dict.fromkeys(s.condition for s in session.screens if s.kind == "round" and s.sitting == screen.sitting)
@@ -64,19 +94,28 @@ def _game(session: Session, screen: Screen) -> dict[str, Any]:
     return found
 
 
-def _end(session: Session) -> dict[str, Any]:
+def _end(session: Place) -> dict[str, Any]:
     context, ending = session.context, session.state
     recruitment = context.study.content.recruitment
     is_live = context.store.mode == "live"
     code = recruitment.codes.get(ending) or context.secrets.code(session.participant, ending)
-    url = recruitment.completion_url.replace("{code}", code).replace("{ending}", ending)
-    return {
+    url = recruitment.completion_url.replace("{code}", quote(code, safe="")).replace("{ending}", ending)
+    found = {
         "type": "screen",
         "name": ending,
         "kind": "end",
-        "progress": 1.0 if ending == "complete" else round(session.index / max(1, len(session.screens)), 3),
+        "progress": 1.0 if ending == "complete" else _share(session),
         "html": context.text(ending),
         "ending": ending,
         "code": code,
         "url": url.replace("{participant}", session.participant) if is_live else "",
     }
+    if ending == "device_failed":
+        checks = [json.loads(row["outcome"]) for row in session.visits() if row["kind"] == "device" and row["outcome"]]
+        found["failed"] = checks[-1].get("failed", []) if checks else []
+    return found
+
+
+def _share(session: Place) -> float:
+    """How much of the study lies behind a participant, 0 to 1."""
+    return round(session.index / max(1, session.index, len(session.screens)), 3)

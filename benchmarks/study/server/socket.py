@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import json
 import logging
 import sqlite3
 from collections.abc import Mapping
@@ -13,12 +12,12 @@ from typing import TYPE_CHECKING, Any, Final
 from benchmarks.study.server import protocol as p
 from benchmarks.study.server.hub import Connection
 from benchmarks.study.server.rates import Bucket
-from benchmarks.study.server.session import Refused, Session
+from benchmarks.study.server.refusal import Gone, Refused
 
 if TYPE_CHECKING:
-    from starlette.websockets import WebSocket
-
     from benchmarks.study.server.hub import Hub
+    from benchmarks.study.server.line import Line
+    from benchmarks.study.server.session import Session
 
 __all__ = ["attend"]
 
@@ -26,118 +25,165 @@ _FIRST_WORD: Final = 20.0
 """Seconds in which a new connection has to say who it is."""
 _LOOK: Final = 1.0
 """Seconds between two looks at the idle clock."""
+_MOST_BAD: Final = 20
+"""Messages that are not understood, after which a connection ends."""
+_NOT_STORED: Final = {"type": "refused", "reason": "this could not be stored", "fatal": True}
 _log = logging.getLogger("legible.study")
 
 
-async def attend(socket: WebSocket, hubs: Mapping[str, Hub]) -> None:
+async def attend(line: Line, hubs: Mapping[Any, Hub]) -> None:
     """Serve one connection until it ends.
 
     Args:
-        socket: Not yet accepted.
+        line: The connection.
         hubs: By mode.
     """
-    from starlette.websockets import WebSocketDisconnect
-
-    await socket.accept()
-    with contextlib.suppress(WebSocketDisconnect, RuntimeError):
-        found = await _first_word(socket, hubs)
-        if found is None:
+    with contextlib.suppress(Gone):
+        hello = await _first_word(line)
+        if hello is None:
+            await _dismiss(line, "the first message must be a hello", 4401)
             return
-        hub, session, hello = found
-        connection = _connection(socket, hub, session)
-        await session.log("connect", tab=hello.tab, width=hello.width, height=hello.height, touch=hello.touch)
-        await hub.attach(session, connection)
+        for hub in hubs.values():
+            session = hub.enter(hello.token)
+            if session is not None:
+                try:
+                    await _Visitor(line, hub, session).serve(hello)
+                finally:
+                    hub.leave(session)
+                return
+        await _dismiss(line, "unknown participant", 4401)
+
+
+async def _first_word(line: Line) -> p.Hello | None:
+    try:
+        async with asyncio.timeout(_FIRST_WORD):
+            message = p.read_message(await line.receive())
+    except (ValueError, TimeoutError):
+        return None
+    return message if isinstance(message, p.Hello) else None
+
+
+async def _dismiss(line: Line, reason: str, code: int) -> None:
+    await line.send({"type": "refused", "reason": reason, "fatal": True})
+    await line.close(code)
+
+
+class _Visitor:
+    """A page of a participant whom the server knows."""
+
+    def __init__(self, line: Line, hub: Hub, session: Session) -> None:
+        self.line = line
+        self.hub = hub
+        self.session = session
+        now = hub.context.now()
+        self.connection = Connection(self.send, line.close, now, now)
+        pace = hub.context.pace
+        self._messages = Bucket(pace.messages, pace.burst)
+        self._events = Bucket(pace.events, pace.event_burst)
+        self._bad = 0
+
+    async def send(self, message: Mapping[str, Any]) -> None:
+        self.hub.told(self.session.participant, message)
+        await self.line.send(message)
+
+    async def serve(self, hello: p.Hello) -> None:
+        session = self.session
+        if not self.hub.may_connect(session.participant):
+            await _dismiss(self.line, "too many connections", 4429)
+            return
         try:
-            await connection.send(await session.open(hello.tab))
-            async with asyncio.TaskGroup() as group:
-                idle = group.create_task(_watch_idle(hub, session, connection))
-                await _listen(socket, hub, session, connection)
-                idle.cancel()
-        except* (WebSocketDisconnect, RuntimeError):
+            await self.hub.attach(session, self.connection)
+            page = {"width": hello.width, "height": hello.height, "touch": hello.touch}
+            await self.send(await session.open(hello.tab, **page))
+            await self._listen()
+        except Refused as refusal:
+            await self.send(refusal.reply)
+            await self.line.close(4401)
+        except sqlite3.Error as error:
+            _log.error("participant %s: %s", session.participant, error)
+            await self.send(_NOT_STORED)
+            await self.line.close(1013)
+        except Gone:
             pass
+        except Exception as error:
+            await self._failed(error)
+            await _dismiss(self.line, "something went wrong", 1011)
         finally:
-            hub.detach(session, connection)
+            self.hub.detach(session, self.connection)
             with contextlib.suppress(sqlite3.Error):
                 await session.log("disconnect")
 
+    async def _failed(self, error: Exception) -> None:
+        """Keep an error that nobody expected, for the monitor and for the log of the server."""
+        _log.error("participant %s: %s", self.session.participant, type(error).__name__, exc_info=error)
+        with contextlib.suppress(sqlite3.Error):
+            await self.session.log("error", error=f"{type(error).__name__}: {error}"[:1000])
 
-async def _first_word(socket: WebSocket, hubs: Mapping[str, Hub]) -> tuple[Hub, Session, p.Hello] | None:
-    try:
-        message = p.read_message(await asyncio.wait_for(socket.receive_text(), _FIRST_WORD))
-    except (ValueError, KeyError, TimeoutError):
-        message = None
-    if isinstance(message, p.Hello):
-        for hub in hubs.values():
-            session = hub.session_of(message.token)
-            if session is not None:
-                return hub, session, message
-    await socket.send_text(json.dumps({"type": "refused", "reason": "unknown participant", "fatal": True}))
-    await socket.close(4401)
-    return None
+    async def _listen(self) -> None:
+        idle = asyncio.create_task(self._watch_idle())
+        try:
+            while True:
+                text = await self.line.receive()
+                if not self.hub.is_newest(self.session, self.connection):
+                    return  # what an older tab had still on its way
+                if not self._messages.take():
+                    await self.session.log("too_fast")
+                    await _dismiss(self.line, "too many messages", 4429)
+                    return
+                for reply in await self._replies(text):
+                    await self.send(reply)
+                    if reply.get("close"):
+                        await self.line.close(reply["close"])
+                        return
+        finally:
+            idle.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await idle
 
+    async def _replies(self, text: str | bytes) -> list[Any]:
+        session = self.session
+        try:
+            message = p.read_message(text)
+        except ValueError as error:
+            await self._note("bad_message", reason=str(error))
+            self._bad += 1
+            more = {"fatal": True, "close": 4400} if self._bad >= _MOST_BAD else {}
+            return [{"type": "refused", "reason": "this message was not understood", **more}]
+        if session.is_sign_of_life(message):
+            self.connection.heard = session.context.now()
+        if isinstance(message, p.Event) and (message.kind == "active" or not self._events.take()):
+            return []
+        try:
+            return await session.handle(message)
+        except Refused as refusal:
+            await self._note("refused", reason=str(refusal)[:500], message=message.type)
+            more = {"close": 4401} if refusal.reply.get("fatal") else {}
+            return [{**refusal.reply, **more}]
+        except sqlite3.Error as error:
+            _log.error("participant %s: %s", session.participant, error)
+            return [{**_NOT_STORED, "fatal": False}, await session.reopen()]
 
-def _connection(socket: WebSocket, hub: Hub, session: Session) -> Connection:
-    async def send(message: Mapping[str, Any]) -> None:
-        hub.told(session.participant, message)
-        with contextlib.suppress(RuntimeError):  # it is closed already
-            await socket.send_text(json.dumps(message, separators=(",", ":"), allow_nan=False))
+    async def _note(self, kind: str, **detail: Any) -> None:
+        if self._events.take():
+            await self.session.log(kind, **detail)
 
-    async def close() -> None:
-        with contextlib.suppress(RuntimeError):
-            await socket.close(4409)
-
-    now = hub.context.now()
-    return Connection(send, close, now, now)
-
-
-async def _listen(socket: WebSocket, hub: Hub, session: Session, connection: Connection) -> None:
-    pace = hub.context.pace
-    bucket = Bucket(pace.messages, pace.burst)
-    while True:
-        text = await socket.receive_text()
-        if not bucket.take():
-            await session.log("too_fast")
-            await connection.send({"type": "refused", "reason": "too many messages", "fatal": True})
-            await socket.close(4429)
-            return
-        for reply in await _replies(session, connection, text):
-            await connection.send(reply)
-
-
-async def _replies(session: Session, connection: Connection, text: str) -> list[Any]:
-    try:
-        message = p.read_message(text)
-    except ValueError as error:
-        await session.log("bad_message", reason=str(error)[:500])
-        return [{"type": "refused", "reason": "this message was not understood"}]
-    if not isinstance(message, p.Ping | p.Event):
-        connection.heard = session.context.now()
-    try:
-        return await session.handle(message)
-    except Refused as refusal:
-        return [refusal.reply]
-    except sqlite3.Error as error:
-        _log.error("participant %s: %s", session.participant, error)
-        return [
-            {"type": "refused", "reason": "this could not be stored", "fatal": True},
-            await session.open(session.tab),
-        ]
-
-
-async def _watch_idle(hub: Hub, session: Session, connection: Connection) -> None:
-    """Warn a participant who does nothing, then end their session."""
-    limits = hub.context.study.content.limits
-    warned_at = 0.0
-    while session.state == "active" and limits.idle_timeout:
-        await asyncio.sleep(_LOOK)
-        screen = session.screen
-        if screen is None or screen.kind == "pause":
-            continue
-        idle = hub.context.now() - connection.heard
-        if idle >= limits.idle_timeout:
-            await connection.send(await session.time_out())
-            return
-        if limits.idle_warning and idle >= limits.idle_warning and connection.heard != warned_at:
-            warned_at = connection.heard
-            await session.log("idle_warning")
-            await connection.send({"type": "warning", "seconds": round(limits.idle_timeout - idle)})
+    async def _watch_idle(self) -> None:
+        """Warn a participant who does nothing, then end their session."""
+        limits, session, connection = self.hub.context.study.content.limits, self.session, self.connection
+        warned_at = -1.0
+        with contextlib.suppress(Gone, sqlite3.Error):
+            while session.state == "active" and (limits.idle_timeout or limits.idle_warning):
+                await asyncio.sleep(_LOOK)
+                screen = session.screen
+                if screen is None or screen.kind == "pause":
+                    connection.heard = self.hub.context.now()
+                    continue
+                idle = self.hub.context.now() - connection.heard
+                if limits.idle_timeout and idle >= limits.idle_timeout:
+                    await self.send(await session.time_out())
+                    return
+                if limits.idle_warning and idle >= limits.idle_warning and connection.heard != warned_at:
+                    warned_at = connection.heard
+                    await session.log("idle_warning")
+                    left = round(limits.idle_timeout - idle) if limits.idle_timeout else None
+                    await self.send({"type": "warning", "seconds": left})

@@ -113,7 +113,7 @@ def answer_rows(
     )
 
 
-def event_row(participant: str, design: str, at: float, kind: str, **detail: Any) -> Statement:
+def event_row(participant: str, design: str, at: float, kind: str, /, **detail: Any) -> Statement:
     """Something happened."""
     return (
         "INSERT INTO events (participant, design, at, kind, detail) VALUES (?, ?, ?, ?, ?)",

@@ -85,11 +85,16 @@ class Store:
     def __init__(self, path: Path, *, mode: Mode, name: str) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         self.path = path
+        self._closed = False
         self.mode = mode
         self._lock = _lock(path)
         try:
+            _only_for_owner(path)
             self._writer = self._open()
             self._prepare(mode, name)
+        except sqlite3.DatabaseError as error:
+            self._unlock()
+            raise StudyError(f"{path} cannot be used as the database of a study: {error}") from error
         except BaseException:
             self._unlock()
             raise
@@ -135,6 +140,8 @@ class Store:
         Raises:
             sqlite3.Error: None of them is.
         """
+        if self._closed:
+            raise sqlite3.ProgrammingError("the database is closed")
         loop = asyncio.get_running_loop()
         done: asyncio.Future[None] = loop.create_future()
         self._jobs.put(_Job(statements, done, loop))
@@ -178,6 +185,11 @@ class Store:
         return answers
 
     def _execute(self, job: _Job) -> Exception | None:
+        """Execute a job; what is wrong with its values, which no other job has to suffer for.
+
+        Raises:
+            sqlite3.Error: The database itself failed.
+        """
         connection = self._writer
         connection.execute("SAVEPOINT job")
         try:
@@ -186,7 +198,9 @@ class Store:
                     connection.executemany(sql, values)
                 else:
                     connection.execute(sql, values)
-        except (sqlite3.IntegrityError, sqlite3.ProgrammingError, sqlite3.InterfaceError, OverflowError) as error:
+        except Exception as error:
+            if not connection.in_transaction or isinstance(error, sqlite3.OperationalError):
+                raise  # the disk is full or fails: nothing of this transaction will be there
             connection.execute("ROLLBACK TO job")
             connection.execute("RELEASE job")
             return error
@@ -206,7 +220,10 @@ class Store:
         return str(rows[0][0]) if rows else ""
 
     def close(self) -> None:
-        """Write what waits, and let go of the files."""
+        """Write what waits, and let go of the files; a second time does nothing."""
+        if self._closed:
+            return
+        self._closed = True
         self._jobs.put(None)
         self._thread.join()
         self._reader.close()
@@ -235,6 +252,12 @@ def _resolve(answers: Sequence[tuple[asyncio.Future[None], Exception | None]]) -
             done.set_result(None)
         else:
             done.set_exception(error)
+
+
+def _only_for_owner(path: Path) -> None:
+    """Make the file where it is missing, readable by its owner alone: it holds the ids of workers."""
+    with contextlib.suppress(FileExistsError):
+        os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600))
 
 
 def _lock(path: Path) -> int | None:

@@ -14,7 +14,23 @@ from legible_envs.overcooked.rendering.food import draw_item, draw_pieces, soup_
 from legible_envs.overcooked.rendering.palette import PALETTE, PLAYER_COLOURS
 from legible_envs.overcooked.rendering.tiles import COUNTER_TOP
 
-__all__ = ["CHEF_RISE", "chef_sprite", "draw_pot", "draw_tick", "pot_sprite"]
+__all__ = [
+    "CHEF_RISE",
+    "GAUGE",
+    "chef_sprite",
+    "draw_chef",
+    "draw_flames",
+    "draw_gauge",
+    "draw_hands",
+    "draw_pot",
+    "draw_ready",
+    "draw_steam",
+    "draw_tick",
+    "draw_wedge",
+    "held_at",
+    "held_radius",
+    "pot_sprite",
+]
 
 CHEF_RISE: Final = 0.3
 """How far a chef's hat rises above the cell stood on, in tiles."""
@@ -22,7 +38,7 @@ CHEF_RISE: Final = 0.3
 _STEPS_OF_PROGRESS: Final = 40
 
 
-def _body(canvas: Canvas, colour: str, facing: int) -> None:
+def _body(canvas: Pen, colour: str, facing: int) -> None:
     cloth, shade = PALETTE["cloth"], PALETTE["cloth_shade"]
     canvas.ellipse(0.5, 1.16, 0.3, 0.09, PALETTE["shadow"], 0.32)
     for x in (0.41, 0.59) if facing in (NORTH, SOUTH) else (0.46, 0.55):
@@ -42,7 +58,7 @@ def _body(canvas: Canvas, colour: str, facing: int) -> None:
         canvas.rectangle(0.29, 0.92, 0.42, 0.045, mix(colour, "#000000", 0.15))
 
 
-def _head(canvas: Canvas, colour: str, facing: int) -> None:
+def _head(canvas: Pen, colour: str, facing: int) -> None:
     skin, hair, ink = PALETTE["skin"], PALETTE["hair"], PALETTE["ink"]
     dx = {EAST: 0.03, WEST: -0.03}.get(facing, 0.0)
     x, y = 0.5 + dx, 0.57
@@ -76,7 +92,7 @@ def _head(canvas: Canvas, colour: str, facing: int) -> None:
     _hat(canvas, colour, 0.5 + dx * 0.6, y)
 
 
-def _hat(canvas: Canvas, colour: str, x: float, y: float) -> None:
+def _hat(canvas: Pen, colour: str, x: float, y: float) -> None:
     cloth, shade = PALETTE["cloth"], PALETTE["cloth_shade"]
     rim = mix(shade, PALETTE["ink_soft"], 0.45)
     puffs = ((-0.14, -0.31, 0.125), (0.14, -0.31, 0.125), (0.0, -0.37, 0.15))
@@ -91,22 +107,37 @@ def _hat(canvas: Canvas, colour: str, x: float, y: float) -> None:
         canvas.stroke([(x + dx, y - 0.28), (x + dx * 0.8, y - 0.2)], 0.018, shade)
 
 
-def _hands(canvas: Canvas, facing: int, held: Item | None) -> None:
-    x, y = {NORTH: (0.78, 0.86), SOUTH: (0.5, 1.0), EAST: (0.74, 0.92), WEST: (0.26, 0.92)}[facing]
-    if held is None:
-        if facing in (NORTH, SOUTH):
-            hands = [(0.26, 0.95), (0.74, 0.95)]
-        else:
-            hands = [(x - (0.5 - x) * 0.12, 0.94)]
-    else:
-        draw_item(canvas, held, x, y, 0.185 if held.kind in ("dish", "soup") else 0.165)
+def held_at(facing: int) -> tuple[float, float]:
+    """Where a chef holds things, in tiles from the upper left of their sprite."""
+    return {NORTH: (0.78, 0.86), SOUTH: (0.5, 1.0), EAST: (0.74, 0.92), WEST: (0.26, 0.92)}[facing]
+
+
+def held_radius(kind: str) -> float:
+    """How large things are in a chef's hands, in tiles."""
+    return 0.185 if kind in ("dish", "soup") else 0.165
+
+
+def draw_chef(canvas: Pen, colour: str, facing: int) -> None:
+    """A chef without hands and without the wedge on the floor, on a sheet ``1 + CHEF_RISE`` tall."""
+    _body(canvas, colour, facing)
+    _head(canvas, colour, facing)
+
+
+def draw_hands(canvas: Pen, facing: int, full: bool) -> None:
+    """A chef's hands, empty or round what they hold."""
+    x, y = held_at(facing)
+    if full:
         hands = [(x - 0.19, y + 0.06), (x + 0.19, y + 0.06)]
+    elif facing in (NORTH, SOUTH):
+        hands = [(0.26, 0.95), (0.74, 0.95)]
+    else:
+        hands = [(x - (0.5 - x) * 0.12, 0.94)]
     for hand in hands:
         canvas.circle(*hand, 0.066, mix(PALETTE["skin"], "#7a3f1c", 0.4))
         canvas.circle(*hand, 0.053, PALETTE["skin"])
 
 
-def _pointer(canvas: Canvas, colour: str, facing: int) -> None:
+def draw_wedge(canvas: Pen, colour: str, facing: int) -> None:
     """A small wedge on the floor that says where the chef faces even on very small tiles."""
     shape = {
         NORTH: [(0.4, 0.37), (0.5, 0.31), (0.6, 0.37)],
@@ -131,19 +162,20 @@ def chef_sprite(player: int, facing: int, held: Item | None, size: int) -> Sprit
         raise ValueError(f"facing must be 0 N, 1 S, 2 E or 3 W, got {facing!r}")
     colour = PLAYER_COLOURS[player % len(PLAYER_COLOURS)]
     canvas = Canvas(size, tall=1 + CHEF_RISE)
-    _pointer(canvas, colour, facing)
-    if facing == NORTH:
-        _hands(canvas, facing, held)
-    _body(canvas, colour, facing)
+    draw_wedge(canvas, colour, facing)
     if facing != NORTH:
-        _head(canvas, colour, facing)
-        _hands(canvas, facing, held)
-    else:
-        _head(canvas, colour, facing)
+        draw_chef(canvas, colour, facing)
+    if held is not None:
+        draw_item(canvas, held, *held_at(facing), held_radius(held.kind))
+    draw_hands(canvas, facing, held is not None)
+    if facing == NORTH:
+        draw_chef(canvas, colour, facing)
     return canvas.sprite()
 
 
-def _flames(canvas: Canvas, phase: int) -> None:
+def draw_flames(canvas: Pen, phase: int) -> None:
+    """The glow and the flames under a pot that cooks; they flicker between two phases."""
+    canvas.circle(0.5, COUNTER_TOP, 0.37, PALETTE["flame"], 0.35)
     for number in range(9):
         angle = math.pi * (0.08 + 0.84 * number / 8)
         x, y = 0.5 + 0.33 * math.cos(angle), COUNTER_TOP + 0.33 * math.sin(angle)
@@ -156,12 +188,18 @@ def _flames(canvas: Canvas, phase: int) -> None:
             canvas.circle(x, y + 0.03, wide, colour)
 
 
-def _steam(canvas: Canvas, phase: int) -> None:
+def draw_steam(canvas: Pen, phase: int) -> None:
+    """Steam above a hot pot, in two phases."""
     for number, x in enumerate((0.36, 0.5, 0.64)):
         sway = 0.035 if (number + phase) % 2 else -0.035
         base = 0.26 - 0.03 * (number == 1)
         line = [(x, base), (x + sway, base - 0.07), (x - sway, base - 0.15), (x, base - 0.21)]
         canvas.stroke(line, 0.045, PALETTE["steam"], 0.75)
+
+
+def draw_ready(canvas: Pen) -> None:
+    """The glow under a pot whose soup can be taken."""
+    canvas.circle(0.5, COUNTER_TOP, 0.4, PALETTE["ready"])
 
 
 def draw_pot(canvas: Pen, pot: PotView) -> None:
@@ -182,8 +220,13 @@ def draw_pot(canvas: Pen, pot: PotView) -> None:
     canvas.arc(0.5, y, 0.292, (0.66, 0.9), 0.022, "#ffffff", 0.7)
 
 
-def _gauge(canvas: Canvas, share: float, colour: str) -> None:
-    x, y, wide, tall = 0.08, 0.855, 0.84, 0.105
+GAUGE: Final = (0.08, 0.855, 0.84, 0.105)
+"""Left, top, width and height of a pot's gauge, in tiles."""
+
+
+def draw_gauge(canvas: Pen, share: float, colour: str) -> None:
+    """How far a soup has cooked, 0 to 1."""
+    x, y, wide, tall = GAUGE
     canvas.rectangle(x - 0.02, y - 0.02, wide + 0.04, tall + 0.04, PALETTE["ink"], radius=0.07)
     canvas.rectangle(x, y, wide, tall, "#7a6a5c", radius=0.05)
     if share > 0:
@@ -191,7 +234,7 @@ def _gauge(canvas: Canvas, share: float, colour: str) -> None:
         canvas.rectangle(x + 0.03, y + 0.02, max(tall, wide * share) - 0.06, 0.022, "#ffffff", 0.45, radius=0.01)
 
 
-def draw_tick(canvas: Canvas, x: float, y: float, radius: float) -> None:
+def draw_tick(canvas: Pen, x: float, y: float, radius: float) -> None:
     """The mark of something done."""
     canvas.circle(x, y, radius, "#ffffff")
     canvas.circle(x, y, radius * 0.86, PALETTE["ready"])
@@ -207,18 +250,17 @@ def draw_tick(canvas: Canvas, x: float, y: float, radius: float) -> None:
 def _cached_pot(pot: PotView, step: int, size: int) -> Sprite:
     canvas = Canvas(size)
     if pot.is_ready:
-        canvas.circle(0.5, COUNTER_TOP, 0.4, PALETTE["ready"])
+        draw_ready(canvas)
     elif pot.is_cooking:
-        canvas.circle(0.5, COUNTER_TOP, 0.37, PALETTE["flame"], 0.35)
-        _flames(canvas, pot.ticks)
+        draw_flames(canvas, pot.ticks)
     draw_pot(canvas, pot)
     if pot.is_ready:
-        _steam(canvas, 0)
-        _gauge(canvas, 1.0, PALETTE["ready"])
+        draw_steam(canvas, 0)
+        draw_gauge(canvas, 1.0, PALETTE["ready"])
         draw_tick(canvas, 0.83, 0.16, 0.15)
     elif pot.is_cooking:
-        _steam(canvas, pot.ticks)
-        _gauge(canvas, step / _STEPS_OF_PROGRESS, PALETTE["progress"])
+        draw_steam(canvas, pot.ticks)
+        draw_gauge(canvas, step / _STEPS_OF_PROGRESS, PALETTE["progress"])
     return canvas.sprite()
 
 

@@ -13,7 +13,15 @@ from legible_envs.overcooked.game.view import Item
 from legible_envs.overcooked.layout import INGREDIENTS
 from legible_envs.overcooked.rendering.palette import PALETTE
 
-__all__ = ["draw_ingredient", "draw_item", "draw_pieces", "draw_plate", "item_sprite", "soup_colour"]
+__all__ = [
+    "draw_ingredient",
+    "draw_item",
+    "draw_pieces",
+    "draw_plate",
+    "item_sprite",
+    "places_of_pieces",
+    "soup_colour",
+]
 
 
 def _tomato(canvas: Pen, x: float, y: float, r: float) -> None:
@@ -111,19 +119,25 @@ def soup_colour(contents: Sequence[str]) -> str:
     return mix(colour, "#ffcf87", 0.22)
 
 
+def places_of_pieces(count: int) -> list[tuple[float, float, float]]:
+    """``(x, y, radius)`` of each of ``count`` ingredients arranged inside a circle of radius 1 round the origin."""
+    if count == 1:
+        return [(0.0, 0.0, 0.62)]
+    each = {2: 0.46, 3: 0.42, 4: 0.37}.get(count) or 0.82 / math.sqrt(count)
+    places = []
+    for number in range(count):
+        if count <= 4:  # a ring, the first on top or to the left
+            angle, around = 2 * math.pi * (number / count - (0.25 if count > 2 else 0.5)), 1 - each * 1.12
+        else:  # the pattern of a sunflower's seeds fits any number
+            angle, around = number * math.pi * (3 - math.sqrt(5)), (1 - each) * math.sqrt((number + 0.5) / count)
+        places.append((around * math.cos(angle), around * math.sin(angle), each))
+    return places
+
+
 def draw_pieces(canvas: Pen, contents: Sequence[str], x: float, y: float, radius: float) -> None:
     """Ingredients arranged inside a circle of the given radius, smaller the more there are."""
-    count = len(contents)
-    if count == 1:
-        draw_ingredient(canvas, contents[0], x, y, radius * 0.62)
-        return
-    each = radius * ({2: 0.46, 3: 0.42, 4: 0.37}.get(count) or 0.82 / math.sqrt(count))
-    for number, kind in enumerate(contents):
-        if count <= 4:  # a ring, the first on top or to the left
-            angle, around = 2 * math.pi * (number / count - (0.25 if count > 2 else 0.5)), radius - each * 1.12
-        else:  # the pattern of a sunflower's seeds fits any number
-            angle, around = number * math.pi * (3 - math.sqrt(5)), (radius - each) * math.sqrt((number + 0.5) / count)
-        draw_ingredient(canvas, kind, x + around * math.cos(angle), y + around * math.sin(angle), each)
+    for kind, (dx, dy, size) in zip(contents, places_of_pieces(len(contents)), strict=True):
+        draw_ingredient(canvas, kind, x + dx * radius, y + dy * radius, size * radius)
 
 
 def draw_plate(canvas: Pen, x: float, y: float, radius: float) -> None:

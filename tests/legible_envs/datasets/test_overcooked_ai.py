@@ -147,6 +147,7 @@ def test_plays_of_2019_replay_in_either_form(tmp_path: Path) -> None:
     assert trajectories_of_games([game], "game")
 
 
+@pytest.mark.slow
 @pytest.mark.data
 def test_all_games_of_2019_replay_by_the_readable_rules() -> None:
     checks = [check_replay(game) for game in overcooked_2019.load_recorded_games()]

@@ -68,6 +68,7 @@ def test_an_svg_can_stand_in_a_page_and_be_read_aloud(tmp_path):
     assert "DejaVu" not in content  # the viewer's own font
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "head"), [("svg", b"<svg"), ("pdf", b"%PDF"), ("png", b"\x89PNG")])
 def test_the_same_figure_has_the_same_bytes(tmp_path, kind, head):
     once, made = save_figure(tmp_path / f"once.{kind}", chart()).read_bytes(), chart()

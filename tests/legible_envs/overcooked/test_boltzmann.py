@@ -162,6 +162,7 @@ def test_kernel_equals_definition(shape):
             assert sum(row["contribution"] for row in ws.explain(genome)) == pytest.approx(summary["score"])
 
 
+@pytest.mark.slow
 def test_invalid_genomes_have_no_score():
     ws = OvercookedWorkspace((5, 5), human="boltzmann")
     genomes = ws.sample(4, np.random.default_rng(0))

@@ -37,6 +37,7 @@ def negative_log_likelihood(walks, rationality: float) -> float:
     return total
 
 
+@pytest.mark.slow
 def test_fit_is_the_maximum_and_its_interval_the_likelihood_ratios():
     walks = BoltzmannWalker(rationality=1.2).sample(OPEN, "pot", ("onion", "dish"), 40, np.random.default_rng(0))
     fit = fit_rationality(walks)

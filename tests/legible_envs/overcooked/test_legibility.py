@@ -180,6 +180,7 @@ def test_kernel_equals_brute_force_on_a_custom_task():
         assert score == pytest.approx(expected, abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["ones", "continuous", "halves"])
 @pytest.mark.parametrize("ties", ["expected", "strict"])
 def test_weighted_kernel_equals_definition(kind, ties):

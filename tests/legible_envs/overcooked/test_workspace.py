@@ -47,6 +47,7 @@ def test_samples_are_valid_and_round_trip(seed, shape, rate):
         assert all(field[layout.access(name)[0]] >= 0 for name in layout.stations)
 
 
+@pytest.mark.slow
 @given(st.integers(0, 2**32 - 1), st.booleans())
 @settings(max_examples=100, deadline=None)
 def test_every_array_in_range_decodes_or_is_rejected(seed, distinct):
@@ -318,6 +319,7 @@ def test_genomes_of_every_shape(shape):
         ws.decode(genomes[0].astype(np.int64) + 2**16)
 
 
+@pytest.mark.slow
 def test_scores_of_genomes_in_wide_integers_are_those_of_the_layout():
     ws = OvercookedWorkspace((3, 66 - 2))
     big = OvercookedWorkspace((40, 40), recipes=[["onion", "fish"]])

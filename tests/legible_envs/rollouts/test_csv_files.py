@@ -16,6 +16,7 @@ from legible_envs.support.csv_table import CsvSyntaxError, join_values, read_rec
 from tests.legible_envs.rollouts.hostile import HARD_NAMES, KITCHEN, MANY, NAMES, TEXTS
 
 
+@pytest.mark.slow
 @settings(max_examples=80, deadline=None)
 @given(found=MANY)
 def test_trajectories_survive_csv_and_npz(tmp_path_factory: pytest.TempPathFactory, found: list[Trajectory]) -> None:
@@ -210,6 +211,7 @@ def test_hostile_quotes_take_linear_time() -> None:
             list(read_records(text))
 
 
+@pytest.mark.slow
 def test_a_million_values_are_read_in_seconds(tmp_path: Path) -> None:
     long = [Trajectory(np.stack([np.arange(60_000.0)] * 2, axis=1), goal="a", candidates=("a", "b")) for _ in range(2)]
     assert read_csv(write_csv(tmp_path / "long.csv", long)) == long

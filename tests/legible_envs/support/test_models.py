@@ -22,6 +22,7 @@ from legible_envs.support.models import (
     Whole,
     YamlModel,
     as_plain,
+    problems_of,
     validated,
 )
 from legible_envs.support.validation import integer
@@ -95,6 +96,18 @@ def test_wrong_data_are_refused_in_our_words(data, message):
 class Task(YamlModel):
     names: Annotated[list[Annotated[str, Text()]], Length(0, 3), OneOrMore()] = []
     even: Annotated[int, Checked(lambda name, value: integer(name, value, 0, 8))] = 0
+
+
+def test_all_problems_are_told_with_their_places():
+    class Keyed(Content):
+        named: dict[Annotated[str, Choice("a", "b")], int] = Field(default={})
+
+    data = {"parts": [{"count": 0}, PART | {"coutn": 1}], "kind": "c", "named": {"z": 1}}
+    found = dict(problems_of(Keyed, data, "the file"))
+    assert found.keys() == {("parts", 0), ("parts", 0, "count"), ("parts", 1, "coutn"), ("kind",), ("named", "z")}
+    assert found["parts", 0] == "`parts[0]` lacks the key `name`"
+    assert found["named", "z"] == "`named.z` must be 'a' or 'b', got 'z'"
+    assert problems_of(Content, {"parts": [PART]}) == []
 
 
 def test_one_text_stands_for_a_list_and_null_for_nothing_said():

@@ -61,6 +61,7 @@ def test_normal_numbers_of_the_tail_and_of_every_layer():
     assert np.abs(values).max() > 4.5
 
 
+@pytest.mark.slow
 def test_plain_python_draws_the_same():
     code = (
         "import numpy as np\n"

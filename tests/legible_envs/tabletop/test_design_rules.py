@@ -54,6 +54,7 @@ def compare_rules(ws, genomes):
     return found
 
 
+@pytest.mark.slow
 def test_the_kernel_is_the_readable_rules():
     ws = TabletopWorkspace("columns")
     found = compare_rules(ws, broken(ws, 1000, 0))

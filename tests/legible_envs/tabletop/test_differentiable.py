@@ -176,6 +176,7 @@ def test_torch_is_loaded_only_when_asked_for():
 # -- searching ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_workspace_with_continuous_measures_is_one(ws):
     check_workspace(ws)
     again = make_workspace(ws.to_config())
@@ -217,6 +218,7 @@ def test_gradients_lead_a_search_uphill(ws):
     assert led.config["emitter"]["settings"]["objective"] == "legibility"
 
 
+@pytest.mark.slow
 def test_the_emitter_keeps_the_contract_and_resumes(ws, tmp_path):
     check_emitter("gradient-arborescence", ws)
     settings = {"emitter": "gradient-arborescence", "evaluations": 1200, "initial": 200, "seed": 4, "progress": False}

@@ -1,6 +1,7 @@
 """Differential evolution beside scipy's on a continuous workspace."""
 
 import numpy as np
+import pytest
 from ribs.schedulers import Scheduler
 from scipy.optimize import differential_evolution
 
@@ -45,6 +46,7 @@ def theirs(strategy, seed):
     return np.log10(found.fun)
 
 
+@pytest.mark.slow
 def test_differential_evolution_gets_as_far_as_scipys_with_every_strategy():
     gaps = {}
     for strategy in ("best1bin", "rand1bin", "currenttobest1bin"):

@@ -79,6 +79,7 @@ def test_the_next_generation_is_novel_or_locally_better(started, told):
         assert len(after.past) <= 500
 
 
+@pytest.mark.slow
 @given(POINTS, st.integers(1, 25))
 def test_of_equally_near_ones_the_first_are_neighbours(points, k):
     distances = np.abs(points[:, :1] - points[:, 1])

@@ -83,6 +83,7 @@ def run_slowly(folder):
     search(SHELF, objective=Slowly(), checkpoint=folder, resume="auto", **SETTINGS)
 
 
+@pytest.mark.slow
 @needs_fork
 @pytest.mark.parametrize("seed", range(3))
 def test_killed_at_random_moments_continues_to_the_identical_archive(tmp_path, uninterrupted, seed):

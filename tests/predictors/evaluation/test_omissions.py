@@ -262,6 +262,7 @@ def test_answers_that_are_probabilities_pass() -> None:
 # -- reports ----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_reports_show_a_dash_and_the_reason(tmp_path: Path) -> None:
     from rich.console import Console
 

@@ -47,6 +47,7 @@ def participant_means(table: pd.DataFrame, fraction: float) -> pd.DataFrame:
 # -- oracles ----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sizes", [(8, 8, 8), (5, 9, 12, 7), (6, 11)])
 def test_between_participants_agrees_with_statsmodels_and_scipy(sizes: tuple[int, ...]) -> None:
     anova_lm = pytest.importorskip("statsmodels.stats.anova").anova_lm
