@@ -108,7 +108,7 @@ def export(
 @click.option("--include-incomplete", is_flag=True, help="Count participants who are not complete, too.")
 @click.option("--exclude", multiple=True, metavar="PARTICIPANT", help="Leave a participant out; repeatable.")
 @click.option("--treatment", metavar="CONDITION",
-              help="Where goals should be predicted better. [default: the paper's, if there]")  # fmt: skip
+              help="Where goals should be predicted better. [default: the paper's, where they are]")  # fmt: skip
 @click.option("--control", "controls", multiple=True, metavar="CONDITION",
               help="Than where; repeatable. [default: all others]")  # fmt: skip
 @design_option

@@ -64,7 +64,7 @@ class PersonRow:
 
 @dataclass(frozen=True, slots=True)
 class VisitRow:
-    """A screen that was begun; see the table ``visits``. ``outcome`` is its text, None before the visit has ended."""
+    """A screen that was begun; see the table ``visits``. ``outcome`` is its text, None before the visit ends."""
 
     visit: int
     participant: str
@@ -154,7 +154,8 @@ def people(connection: sqlite3.Connection) -> list[PersonRow]:
     """All participants, in the order of their names."""
     columns = "participant, design, order_number, conditions, seed, joined, seen, screen, state, ended, language"
     rows = connection.execute(f"SELECT {columns} FROM participants ORDER BY length(participant), participant")
-    return [PersonRow(row[0], row[1], row[2], _names(row[3]), *row[4:]) for row in rows]
+    found: list[list[Any]] = [[*row[:3], _names(row[3]), *row[4:]] for row in rows]
+    return [PersonRow(*values) for values in found]
 
 
 def _names(text: object) -> tuple[str, ...]:

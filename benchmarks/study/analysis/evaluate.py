@@ -179,7 +179,7 @@ def _splits(
 
 
 def whole_units(table: pd.DataFrame, factor: str, value: str) -> pd.DataFrame:
-    """The rows of participants who have a value at every level of a factor, and at every fraction if there are any."""
+    """The rows of participants who have a value at every level of a factor (and every fraction, if there are any)."""
     known = table.dropna(subset=[value])
     keys = [factor, *(["fraction"] if "fraction" in known else [])]
     if not len(known):

@@ -30,8 +30,8 @@ TABLES_OF_A_PERSON: Final = ("participants", "workers", "visits", "steps", "poin
 _README: Final = """\
 Everything that the study "{title}" has stored about participant {participant}.
 
-data.json holds all of it; each table lies beside it as CSV. Times are seconds since 1970 (UTC), unless they are times
-of the browser, which are milliseconds of its own clock.
+data.json holds all of it; each table lies beside it as CSV. Times are seconds since 1970 (UTC), but for times of
+the browser, which are milliseconds of its own clock.
 
 participants   how far you got, and the order in which you met the conditions
 workers        who you are on the platform that sent you, if one did

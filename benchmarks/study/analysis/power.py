@@ -192,7 +192,7 @@ def power_at(
 def _paired(samples: Floats) -> Floats:
     """``(m,)`` p-values of ``(m, n, 2)`` samples.
 
-    A sample whose differences do not vary is not significant: so many draws of the same participant say nothing.
+    One whose differences do not vary is not significant: so many draws of the same participant say nothing.
     """
     from scipy import stats
 

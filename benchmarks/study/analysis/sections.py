@@ -220,7 +220,7 @@ def _confusions(study: Study, found: Findings, folder: Path) -> Section | None:
         for name in study.conditions
         if len(rows[(rows["predictor"] == predictor) & (rows["condition"] == name)])
     }
-    text = f"Trajectories by true and predicted goal, mean over fractions observed and repeats; by {predictor}."
+    text = f"Trajectories by true and predicted goal, mean over fractions and repeats; predictions of {predictor}."
     return Section("Confusions", text, {}, figures.draw_confusions(matrices, predictor, folder))
 
 
