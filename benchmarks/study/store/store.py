@@ -14,18 +14,18 @@ import queue
 import sqlite3
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, Final, Literal, NamedTuple
+from typing import Any, Final, Literal, NamedTuple, TypeVar
 
 from benchmarks.study.errors import StudyError
+from benchmarks.study.store.joining import Statement, is_many, joined
 from benchmarks.study.store.schema import SCHEMA, TABLES
 
 __all__ = ["Mode", "Statement", "Store", "database_path", "open_readonly"]
 
 Mode = Literal["live", "debug"]
-Statement = tuple[str, Sequence[Any]]
-"""SQL with ``?``, and the values for them; a list of value lists as second part means many rows."""
+_Result = TypeVar("_Result")
 
 _MOST_AT_ONCE: Final = 512
 _WAIT: Final = 30.0
@@ -171,18 +171,34 @@ class Store:
 
     def _commit(self, jobs: Sequence[_Job]) -> list[tuple[_Job, Exception | None]]:
         """One transaction; a job that fails takes back its own rows alone."""
-        answers: list[tuple[_Job, Exception | None]] = []
+        try:
+            if len(jobs) > 1 and self._commit_together(jobs):
+                return [(job, None) for job in jobs]
+            return self._transact(lambda: [(job, self._execute(job)) for job in jobs])
+        except Exception as error:
+            return [(job, error) for job in jobs]
+
+    def _commit_together(self, jobs: Sequence[_Job]) -> bool:
+        """All jobs as if they were one; False, and nothing is done, where something is wrong with one of them."""
+        statements = joined([statement for job in jobs for statement in job.statements])
+        try:
+            self._transact(lambda: [self._writer.execute(sql, values) for sql, values in statements])
+        except Exception:
+            return False
+        return True
+
+    def _transact(self, work: Callable[[], _Result]) -> _Result:
+        """Do something in a transaction of its own; what raises leaves nothing behind."""
         connection = self._writer
         try:
             connection.execute("BEGIN IMMEDIATE")
-            for job in jobs:
-                answers.append((job, self._execute(job)))
+            result = work()
             connection.execute("COMMIT")
-        except Exception as error:
+        except Exception:
             with contextlib.suppress(sqlite3.Error):
                 connection.execute("ROLLBACK")
-            return [(job, error) for job in jobs]
-        return answers
+            raise
+        return result
 
     def _execute(self, job: _Job) -> Exception | None:
         """Execute a job; what is wrong with its values, which no other job has to suffer for.
@@ -194,7 +210,7 @@ class Store:
         connection.execute("SAVEPOINT job")
         try:
             for sql, values in job.statements:
-                if values and isinstance(values[0], list | tuple):
+                if is_many(values):
                     connection.executemany(sql, values)
                 else:
                     connection.execute(sql, values)

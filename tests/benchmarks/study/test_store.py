@@ -7,9 +7,12 @@ import sqlite3
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from benchmarks.study.errors import StudyError
 from benchmarks.study.store import Store, open_readonly, rows
+from benchmarks.study.store.joining import is_many, joined
 
 
 def store_at(tmp_path: Path) -> Store:
@@ -60,3 +63,36 @@ def test_what_is_no_database_of_this_study_is_refused(tmp_path: Path) -> None:
         Store(tmp_path / "text.sqlite", mode="live", name="tiny")
     with pytest.raises(StudyError, match="nobody has taken part"), open_readonly(tmp_path / "none.sqlite"):
         pass
+
+
+_KEYS = st.integers(0, 3).map(str)
+_STATEMENTS = st.one_of(
+    st.lists(st.integers(0, 200).map(lambda n: ["e", n]), min_size=1, max_size=150).map(
+        lambda many: ("INSERT INTO e VALUES (?, ?)", many)
+    ),
+    st.builds(lambda key, value: ("INSERT OR REPLACE INTO s VALUES (?, ?)", [key, value]), _KEYS, st.floats(0, 1)),
+    st.builds(lambda key: ("INSERT INTO e VALUES (?, NULL)", [key]), _KEYS),
+    st.builds(lambda key: ("UPDATE s SET value = value + 1 WHERE key = ?", [key]), _KEYS),
+)
+
+
+@given(st.lists(_STATEMENTS, max_size=20))
+def test_statements_that_are_joined_do_the_same(statements: list[tuple[str, list[object]]]) -> None:
+    """Order counts: a key that is replaced and updated ends with the last value."""
+    found = []
+    for is_joined in (False, True):
+        database = sqlite3.connect(":memory:")
+        database.executescript("CREATE TABLE e (a, b); CREATE TABLE s (key PRIMARY KEY, value)")
+        executions = joined(statements) if is_joined else statements
+        for sql, values in executions:
+            (database.executemany if is_many(values) else database.execute)(sql, values)  # type: ignore[arg-type]
+        found.append([database.execute(f"SELECT rowid, * FROM {table} ORDER BY rowid").fetchall() for table in "es"])
+        database.close()
+    assert found[0] == found[1]
+
+
+def test_steps_of_many_participants_are_few_statements() -> None:
+    step = [rows.step_rows(n, "P001", "d", [(0, 1, "00", None, None, 0.0)]) for n in range(200)]
+    executions = joined(step)
+    assert [sql.count("(?") for sql, _ in executions] == [64, 64, 64, 8]
+    assert all(len(values) < 999 for _, values in executions)
