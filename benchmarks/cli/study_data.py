@@ -108,7 +108,7 @@ def export(
 @click.option("--include-incomplete", is_flag=True, help="Count participants who are not complete, too.")
 @click.option("--exclude", multiple=True, metavar="PARTICIPANT", help="Leave a participant out; repeatable.")
 @click.option("--treatment", metavar="CONDITION",
-              help="Where goals should be predicted better. [default: the paper's, where the study has them]")  # fmt: skip
+              help="Where goals should be predicted better. [default: the paper's, where they are]")  # fmt: skip
 @click.option("--control", "controls", multiple=True, metavar="CONDITION",
               help="Than where; repeatable. [default: all others]")  # fmt: skip
 @design_option
@@ -194,7 +194,9 @@ class EffectSize(click.ParamType):
 
     name = "xFACTOR|difference"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, float | None]:
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, float | None]:
         """Factor and difference, one of them 1 or None."""
         import math
 
@@ -224,7 +226,9 @@ class EffectSize(click.ParamType):
               help="Of what is observed, such as x0.5, or the true difference. [default: x1]")  # fmt: skip
 @click.option("--participants", type=Counts(), default=(8, 12, 16, 20, 24, 32, 40, 48), metavar="N,N,...",
               help="Numbers to try. [default: 8,12,16,20,24,32,40,48]")  # fmt: skip
-@click.option("--power", "wanted", type=click.FloatRange(0, 1, min_open=True, max_open=True), default=0.8, show_default=True)
+@click.option(
+    "--power", "wanted", type=click.FloatRange(0, 1, min_open=True, max_open=True), default=0.8, show_default=True
+)
 @click.option("--alpha", type=click.FloatRange(0, 1, min_open=True, max_open=True), default=0.05, show_default=True)
 @click.option("--people", type=click.IntRange(2, 10_000), default=24, show_default=True, help="To be simulated.")
 @click.option("--draws", type=click.IntRange(100, 1_000_000), default=2000, show_default=True)
@@ -276,7 +280,9 @@ def power(
 
 def _print_power(found: Power, measure: str, source: str) -> None:
     effect = found.effect
-    who = plural(found.pilot, "simulated person" if source == "simulated" else "participant").replace("persons", "people")
+    who = plural(found.pilot, "simulated person" if source == "simulated" else "participant").replace(
+        "persons", "people"
+    )
     if found.observed is not None and found.standardised is not None:
         tell(
             f"{measure}: {effect.treatment} less {effect.control} is {shown_number(found.observed, 4)} in {who} "

@@ -76,7 +76,9 @@ def table_study(folder: Path, **settings: Any) -> Study:
 
 
 def _study(folder: Path, domain: str, content: Mapping[str, Any], layouts: Mapping[str, str]) -> Study:
-    settings = StudyContent.model_validate({"schema": 1, "name": "probe", "title": "A probe", "domain": domain, **content})
+    settings = StudyContent.model_validate(
+        {"schema": 1, "name": "probe", "title": "A probe", "domain": domain, **content}
+    )
     for path, text in layouts.items():
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_text(text)

@@ -64,7 +64,7 @@ class PersonRow:
 
 @dataclass(frozen=True, slots=True)
 class VisitRow:
-    """A screen that was begun; see the table ``visits``. ``outcome`` is its text, None where the visit has not ended."""
+    """A screen that was begun; see the table ``visits``. ``outcome`` is its text, None before the visit ends."""
 
     visit: int
     participant: str
@@ -154,7 +154,8 @@ def people(connection: sqlite3.Connection) -> list[PersonRow]:
     """All participants, in the order of their names."""
     columns = "participant, design, order_number, conditions, seed, joined, seen, screen, state, ended, language"
     rows = connection.execute(f"SELECT {columns} FROM participants ORDER BY length(participant), participant")
-    return [PersonRow(*row[:3], _names(row[3]), *row[4:]) for row in rows]
+    found: list[list[Any]] = [[*row[:3], _names(row[3]), *row[4:]] for row in rows]
+    return [PersonRow(*values) for values in found]
 
 
 def _names(text: object) -> tuple[str, ...]:
@@ -182,7 +183,9 @@ def steps_of(connection: sqlite3.Connection, visit: int) -> Iterator[StepRow]:
 def answers_of(connection: sqlite3.Connection, participant: str) -> list[Answer]:
     """A participant's answers, in order."""
     columns = ", ".join(Answer.__slots__)
-    found = connection.execute(f"SELECT {columns} FROM answers WHERE participant = ? ORDER BY visit, item", (participant,))
+    found = connection.execute(
+        f"SELECT {columns} FROM answers WHERE participant = ? ORDER BY visit, item", (participant,)
+    )
     return [Answer(*row) for row in found]
 
 
@@ -197,12 +200,15 @@ def check_design(study: Study, rows: list[PersonRow], wanted: str | None = None)
     Raises:
         ValueError: There are participants of another design, or the folder holds another than is wanted.
     """
-    own, designs = study.design_hash, {}
+    own = study.design_hash
+    designs: dict[str, int] = {}
     for row in rows:
         designs[row.design] = designs.get(row.design, 0) + 1
     counted = ", ".join(f"{design} ({number})" for design, number in sorted(designs.items()))
     if wanted is not None and wanted not in designs:
-        raise ValueError(f"nobody met the design {wanted!r}; the database holds, with participants: {counted or 'none'}")
+        raise ValueError(
+            f"nobody met the design {wanted!r}; the database holds, with participants: {counted or 'none'}"
+        )
     taken = wanted or own
     if taken != own:
         raise ValueError(

@@ -120,8 +120,8 @@ def participant_curve(
 ) -> pd.DataFrame:
     """A learning curve whose accuracies are told for each participant.
 
-    In each of ``repeats`` splits a quarter is held out, and training sets are nested; splits whose smallest training set
-    does not mention every goal are drawn anew.
+    In each of ``repeats`` splits a quarter is held out, and training sets are nested; splits whose smallest training
+    set does not mention every goal are drawn anew.
 
     Args:
         predictor: Unfitted.
@@ -179,7 +179,7 @@ def _splits(
 
 
 def whole_units(table: pd.DataFrame, factor: str, value: str) -> pd.DataFrame:
-    """The rows of participants who have a value at every level of a factor (and at every fraction, if there are any)."""
+    """The rows of participants who have a value at every level of a factor (and every fraction, if there are any)."""
     known = table.dropna(subset=[value])
     keys = [factor, *(["fraction"] if "fraction" in known else [])]
     if not len(known):
@@ -202,7 +202,9 @@ def compare(table: pd.DataFrame, value: str, *, factor: str = "condition", alpha
     if people < 2:
         raise ValueError(f"{people} participant(s) with values at every {factor}; 2 are needed")
     each = compare_conditions(own, factor=factor, value=value, design="within", correct_fractions="holm", alpha=alpha)
-    return Comparisons(each, compare_conditions(own, factor=factor, value=value, at="mean", design="within", alpha=alpha))
+    return Comparisons(
+        each, compare_conditions(own, factor=factor, value=value, at="mean", design="within", alpha=alpha)
+    )
 
 
 def metrics_table(rows: pd.DataFrame, predictors: Sequence[str], conditions: Sequence[str]) -> pd.DataFrame:

@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from benchmarks.study.analysis.database import PersonRow, check_design, people, read_only
 from benchmarks.study.analysis.export_files import GrowingTable, checksums, staging_folder

@@ -40,7 +40,9 @@ COLUMNS: Final[dict[str, tuple[str, ...]]] = {
     ),
     "steps": (*_PLACE, "step", "action", "vx", "vy", "before", "key_down", "frame_shown", "received"),
     "pointer": (*_PLACE, "sample", "at", "x", "y"),
-    "questionnaires": ("participant", "sitting", "condition", "screen", "visit", "questionnaire", "item", "value", "answered"),
+    "questionnaires": (
+        "participant", "sitting", "condition", "screen", "visit", "questionnaire", "item", "value", "answered",
+    ),
     "scales": ("participant", "sitting", "condition", "questionnaire", "scale", "value", "answered", "items"),
     "events": ("participant", "at", "kind", "detail"),
     "problems": ("participant", "table", "row", "problem"),

@@ -135,7 +135,11 @@ def find(
 
 
 def _comparisons(
-    rows: pd.DataFrame, predictors: Sequence[str], conditions: Sequence[str], settings: AnalysisSettings, unsaid: list[str]
+    rows: pd.DataFrame,
+    predictors: Sequence[str],
+    conditions: Sequence[str],
+    settings: AnalysisSettings,
+    unsaid: list[str],
 ) -> dict[str, Comparisons]:
     found = {}
     for predictor in predictors:
@@ -200,7 +204,11 @@ def _work(
             )
             for condition, part in joined.groupby("condition", sort=False)
         ]
-        table = pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=["participant", "condition", "measure", "value"])
+        table = (
+            pd.concat(parts, ignore_index=True)
+            if parts
+            else pd.DataFrame(columns=["participant", "condition", "measure", "value"])
+        )
         sittings = compare_family(table, [sitting.name for sitting in content.sittings], alpha=settings.alpha)
     return work, sittings, _trends(study, data, names, accuracy, fixed, settings)
 

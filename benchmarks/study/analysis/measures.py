@@ -168,7 +168,9 @@ def mean_rows(table: pd.DataFrame, factor: str, value: str, alpha: float = 0.05)
     return rows
 
 
-def trend_rows(table: pd.DataFrame, over: str, names: Mapping[str, str], *, alpha: float = 0.05) -> list[dict[str, Any]]:
+def trend_rows(
+    table: pd.DataFrame, over: str, names: Mapping[str, str], *, alpha: float = 0.05
+) -> list[dict[str, Any]]:
     """How measures change with practice: a slope per participant, and whether its mean is 0 (Student's t).
 
     Args:

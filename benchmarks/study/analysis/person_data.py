@@ -30,7 +30,7 @@ TABLES_OF_A_PERSON: Final = ("participants", "workers", "visits", "steps", "poin
 _README: Final = """\
 Everything that the study "{title}" has stored about participant {participant}.
 
-data.json holds all of it; each table lies beside it as CSV. Times are seconds since 1970 (UTC), unless they are times of
+data.json holds all of it; each table lies beside it as CSV. Times are seconds since 1970 (UTC), but for times of
 the browser, which are milliseconds of its own clock.
 
 participants   how far you got, and the order in which you met the conditions
@@ -183,7 +183,18 @@ def progress_table(study: Study, database: Path, *, told: Callable[[str], object
             except (ValueError, TypeError, KeyError) as error:
                 if told is not None:
                     told(f"{person.participant}: cannot be read: {error}")
-    columns = ["participant", "state", "screens_done", "screens", "share", "rounds_done", "minutes", "joined", "ended", "at"]
+    columns = [
+        "participant",
+        "state",
+        "screens_done",
+        "screens",
+        "share",
+        "rounds_done",
+        "minutes",
+        "joined",
+        "ended",
+        "at",
+    ]
     return pd.DataFrame(rows, columns=columns)
 
 
@@ -213,5 +224,7 @@ def worker_table(database: Path) -> pd.DataFrame:
 
     columns = ["participant", "source", "worker", "study", "session"]
     with read_only(database) as connection:
-        found = connection.execute(f"SELECT {', '.join(columns)} FROM workers ORDER BY length(participant), participant")
+        found = connection.execute(
+            f"SELECT {', '.join(columns)} FROM workers ORDER BY length(participant), participant"
+        )
         return pd.DataFrame(found.fetchall(), columns=columns)

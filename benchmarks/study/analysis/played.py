@@ -8,6 +8,7 @@ import math
 import sqlite3
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -76,7 +77,7 @@ def played(
         outcome = game.outcome()
         if is_kitchen:
             cells.append(game.env.view().players[0].cell)
-            outcome["path_length"] = float(sum(a != b for a, b in zip(cells, cells[1:], strict=False)))
+            outcome["path_length"] = float(sum(a != b for a, b in pairwise(cells)))
         outcome["seconds"] = float(seconds[-1])
         outcome["idle"] = _kitchen_idle(seconds) if is_kitchen else _table_idle(game, steps)
         found = []
@@ -134,7 +135,7 @@ def key_times(steps: Sequence[StepRow], begun: float) -> Floats:
         if part[0] == 0 and steps[0].frame_shown is not None:
             begun = min(float(steps[0].frame_shown) / 1000 + offset, absolute[keyed[0]])
     usual = float(np.median(delays)) if delays else 0.0
-    for i in np.flatnonzero(np.isnan(absolute)):
+    for i in np.flatnonzero(np.isnan(absolute)).tolist():
         absolute[i] = steps[i].received - usual
     found = np.maximum.accumulate(np.concatenate([[min(begun, absolute[0])], absolute]))
     return np.asarray(found - found[0], dtype=np.float64)

@@ -190,8 +190,10 @@ def power_at(
 
 
 def _paired(samples: Floats) -> Floats:
-    """``(m,)`` p-values of ``(m, n, 2)`` samples. A sample whose differences do not vary is not significant: so many
-    draws of the same participant say nothing."""
+    """``(m,)`` p-values of ``(m, n, 2)`` samples.
+
+    One whose differences do not vary is not significant: so many draws of the same participant say nothing.
+    """
     from scipy import stats
 
     difference = samples[:, :, 0] - samples[:, :, 1]
@@ -203,8 +205,10 @@ def _paired(samples: Floats) -> Floats:
 
 
 def _repeated_measures(samples: Floats) -> Floats:
-    """``(m,)`` p-values of ``(m, n, k)`` samples, corrected by Greenhouse and Geisser: the formulas of
-    :func:`predictors.evaluation.statistics.repeated_measures_anova`, for many samples at once."""
+    """``(m,)`` p-values of ``(m, n, k)`` samples, corrected by Greenhouse and Geisser.
+
+    The formulas of :func:`predictors.evaluation.statistics.repeated_measures_anova`, for many samples at once.
+    """
     from scipy import stats
 
     _, number, count = samples.shape
@@ -241,6 +245,4 @@ def wilson(successes: int, trials: int, level: float = 0.95) -> tuple[float, flo
 
 def as_rows(power: Power) -> list[dict[str, Any]]:
     """The points as rows of a table."""
-    return [
-        {"participants": p.participants, "power": p.power, "low": p.low, "high": p.high} for p in power.points
-    ]
+    return [{"participants": p.participants, "power": p.power, "low": p.low, "high": p.high} for p in power.points]

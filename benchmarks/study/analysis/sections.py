@@ -55,7 +55,9 @@ def result_tables(found: Findings) -> dict[str, pd.DataFrame]:
         tables["anova"] = stacked(overall, "predictor").drop(columns="fraction")
         tables["anova_by_fraction"] = stacked({name: one.anova for name, one in by_fraction.items()}, "predictor")
         tables["accuracy_by_fraction"] = stacked({name: one.means for name, one in by_fraction.items()}, "predictor")
-        tables["accuracy_pairs"] = stacked({n: each.overall.pairs for n, each in found.comparisons.items()}, "predictor")
+        tables["accuracy_pairs"] = stacked(
+            {n: each.overall.pairs for n, each in found.comparisons.items()}, "predictor"
+        )
     if found.hypotheses:
         tables["verdicts"] = stacked({name: one.verdicts() for name, one in found.hypotheses.items()}, "treatment")
         tests = {name: one.tests.drop(columns="treatment") for name, one in found.hypotheses.items()}
@@ -72,7 +74,9 @@ def result_tables(found: Findings) -> dict[str, pd.DataFrame]:
 def _choices(found: Findings) -> pd.DataFrame:
     """Every answer of a questionnaire, and how often it was given; free texts among them."""
     answers = found.data.of_analysed("questionnaires")
-    own = answers[answers["value"].notna() & answers["questionnaire"].isin(set(answers["questionnaire"]) - {"", "consent"})]
+    own = answers[
+        answers["value"].notna() & answers["questionnaire"].isin(set(answers["questionnaire"]) - {"", "consent"})
+    ]
     if not len(own):
         return own.head(0)
     keys = ["questionnaire", "condition", "item", "value"]
@@ -92,7 +96,9 @@ def sections_of(study: Study, found: Findings, settings: AnalysisSettings, folde
         _work(study, found, folder),
         _questionnaires(study, found, folder),
         _practice(study, found),
-        Section("What cannot be said", narrate("study/unsaid", people=len(found.data.participants), lines=found.unsaid)),
+        Section(
+            "What cannot be said", narrate("study/unsaid", people=len(found.data.participants), lines=found.unsaid)
+        ),
     ]
     return [part for part in parts if part is not None]
 
@@ -120,7 +126,11 @@ def _participants(study: Study, found: Findings) -> Section:
     return Section(
         "Participants",
         text,
-        {"Participants": people[columns], "Not analysed": found.data.excluded, "Problems": found.data.tables["problems"]},
+        {
+            "Participants": people[columns],
+            "Not analysed": found.data.excluded,
+            "Problems": found.data.tables["problems"],
+        },
     )
 
 
@@ -155,7 +165,9 @@ def _accuracy(study: Study, found: Findings, settings: AnalysisSettings, folder:
     tables = {"Figures of merit, mean over 10 to 90 % observed": found.metrics}
     if found.comparisons:
         tables["Over all fractions: repeated-measures analyses of variance"] = result_tables(found)["anova"]
-        tables["Every pair of conditions (Tukey)"] = result_tables(found)["accuracy_pairs"].drop(columns=["fraction", "cohens_d"])
+        tables["Every pair of conditions (Tukey)"] = result_tables(found)["accuracy_pairs"].drop(
+            columns=["fraction", "cohens_d"]
+        )
     drawn = figures.draw_accuracy(found.comparisons, chances, study.conditions[::-1], folder)
     return Section("How well goals are predicted", text, tables, drawn)
 
@@ -206,7 +218,7 @@ def _confusions(study: Study, found: Findings, folder: Path) -> Section | None:
         for name in study.conditions
         if len(rows[(rows["predictor"] == predictor) & (rows["condition"] == name)])
     }
-    text = f"Trajectories by true and predicted goal, mean over fractions observed and repeats; predictions of {predictor}."
+    text = f"Trajectories by true and predicted goal, mean over fractions and repeats; predictions of {predictor}."
     return Section("Confusions", text, {}, figures.draw_confusions(matrices, predictor, folder))
 
 

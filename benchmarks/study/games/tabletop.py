@@ -103,7 +103,8 @@ class TableGame:
         """The action of a message: two finite numbers, rounded to float32."""
         if not isinstance(value, list) or len(value) != 2:
             raise ValueError(f"an action at a table is [vx, vy], got {value!r:.80}")
-        pair = [float(np.float32(v)) for v in value if type(v) in (int, float) and math.isfinite(v)]
+        with np.errstate(over="ignore"):  # what float32 cannot hold becomes infinite, and is refused as such
+            pair = [float(np.float32(v)) for v in value if type(v) in (int, float) and math.isfinite(v)]
         if len(pair) != 2 or not all(math.isfinite(v) for v in pair):
             raise ValueError(f"an action at a table is two finite numbers, got {value!r:.80}")
         return pair

@@ -147,7 +147,9 @@ def test_participants_are_the_units_within_which_conditions_are_compared(analyse
     hypotheses = analysed.findings.hypotheses["Legible"]
     assert hypotheses.unit == "participant"
     assert set(hypotheses.tests["hypothesis"]) == {"H1", "H2", "H3"}
-    first = hypotheses.tests[(hypotheses.tests["predictor"] == NEAREST.label) & (hypotheses.tests["hypothesis"] == "H1")]
+    first = hypotheses.tests[
+        (hypotheses.tests["predictor"] == NEAREST.label) & (hypotheses.tests["hypothesis"] == "H1")
+    ]
     pair = found.overall.pairs.iloc[0]
     assert first["difference"].iloc[0] == pytest.approx(-pair["difference"])
     assert first["p"].iloc[0] == pytest.approx(pair["p"])
@@ -213,7 +215,9 @@ def test_sittings_with_and_without_obstacles_are_told_apart(tmp_path: Path) -> N
     assert "V" not in bare.layout.to_ascii()
     found = find(study, data, replace(FAST, predictors=(NEAREST,)), [Claim("Legible", ("Random",))])
     assert found.sittings is not None
-    assert {"Legible: completion time, s", "Random: accuracy of shortest distance"} <= set(found.sittings.tests["measure"])
+    assert {"Legible: completion time, s", "Random: accuracy of shortest distance"} <= set(
+        found.sittings.tests["measure"]
+    )
     assert set(found.sittings.means["condition"]) == {"on", "off", "again"}
     by_hand = data.tables["rounds"].query("counts == 1 and condition == 'Legible' and sitting != 'off'")
     own = found.work.means.set_index(["measure", "condition"])["mean"]
@@ -277,7 +281,10 @@ def test_a_slope_over_positions_is_found() -> None:
 def test_the_papers_claims_are_tested_as_far_as_the_study_has_its_conditions() -> None:
     assert claims_of("overcooked", ["Legible", "Random"]) == [Claim("Legible", ("Random",))]
     assert claims_of("overcooked", ["A", "B"]) == []
-    assert [claim.treatment for claim in claims_of("tabletop", ["Baseline", "Both", "Placement"])] == ["Placement", "Both"]
+    assert [claim.treatment for claim in claims_of("tabletop", ["Baseline", "Both", "Placement"])] == [
+        "Placement",
+        "Both",
+    ]
     assert claims_of("overcooked", ["A", "B", "C"], "B") == [Claim("B", ("A", "C"))]
     with pytest.raises(ValueError, match="no condition 'Z'"):
         claims_of("overcooked", ["A", "B"], "Z")

@@ -118,7 +118,9 @@ def test_tables_hold_what_the_database_holds(recorded: tuple[Study, Path], expor
     assert [row["included"] for row in people.values()] == ["1", "1", "1", "0"]
     assert people["P001"]["attention_passed"] == people["P001"]["attention_checks"] == "3"
     assert {each.participant for each in load_trajectories(exported / "trajectories.npz")} == {"P001", "P002", "P003"}
-    assert len(load_trajectories(exported / "trajectories.csv")) == len(load_trajectories(exported / "trajectories.npz"))
+    assert len(load_trajectories(exported / "trajectories.csv")) == len(
+        load_trajectories(exported / "trajectories.npz")
+    )
     for name, columns in COLUMNS.items():
         if name != "pointer":
             assert (exported / f"{name}.csv").read_text().splitlines()[0] == ",".join(columns)
@@ -249,7 +251,9 @@ def test_minari_gives_the_same_trajectories(make: Any, tmp_path: Path, monkeypat
     study = make(tmp_path / "study")
     export(study, record_study(study, 1), tmp_path / "out", minari="study/probe-v0")
     ours, theirs = load_trajectories(tmp_path / "out" / "trajectories.npz"), from_minari("study/probe-v0")
-    assert [(e.participant, e.condition, e.goal) for e in ours] == [(e.participant, e.condition, e.goal) for e in theirs]
+    assert [(e.participant, e.condition, e.goal) for e in ours] == [
+        (e.participant, e.condition, e.goal) for e in theirs
+    ]
     assert [e.states.tolist() for e in ours] == [e.states.tolist() for e in theirs]
 
 
