@@ -1,4 +1,4 @@
-"""``legible study serve`` as a process of its own: links, exit codes and designs; and as seen through a proxy."""
+"""``legible study serve`` as a process of its own: links, exit codes and designs."""
 
 from __future__ import annotations
 
