@@ -62,6 +62,7 @@ def serve(
     participants are doing; keep that link to yourself), and serves until Ctrl-C.
     """
     from benchmarks.study.design.study import check_study, load_study
+    from benchmarks.study.errors import StudyError
     from benchmarks.study.server.run import Address
     from benchmarks.study.server.run import serve as serve_study
     from benchmarks.study.store import Mode
@@ -70,7 +71,7 @@ def serve(
         for problem in problems:
             tell(str(problem), err=True)
         count = f"{len(problems)} thing{'s are' if len(problems) > 1 else ' is'}"
-        raise click.ClickException(f"{count} missing or wrong in {click.format_filename(folder)}; nobody is served")
+        raise StudyError(f"{count} missing or wrong in {click.format_filename(folder)}; nobody is served")
     study = load_study(folder)
     address = Address(tls_cert=tls_cert or "", tls_key=tls_key or "", **at)
     modes: tuple[Mode, ...] = ("debug",) if debug_only else ("live", "debug")

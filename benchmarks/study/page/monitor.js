@@ -92,7 +92,7 @@ function frame() {
   main.replaceChildren(places.head, places.tiles, el("div", { class: "columns" },
     section("Participants", places.people, { class: "box wide" }),
     section("Session", watch.element, { class: "box side", id: "session" }),
-    section("Orders", places.balance), section("Error log", places.problems), section("Data", places.volume)));
+    section("Orders", places.balance), section("Error log", places.problems), section("Data", places.volume, { class: "box wide" })));
 }
 
 // What has not changed stays, so that focus and scroll positions do.

@@ -16,7 +16,7 @@ const isShown = (person) => ({ here: person.connected, active: person.state === 
 
 function facts(person, now) {
   const isActive = person.state === "active";
-  const place = person.earlier_design ? "another design" : isActive ? person.name || "start" : `screen ${person.screen} of ${person.screens}`;
+  const place = person.earlier_design ? "another design" : isActive ? person.name || "start" : "";
   const game = isActive && person.steps ? `${person.steps} steps${person.kind === "practice" ? `, attempt ${person.attempt}` : ""}` : "";
   const [right, asked] = person.attention;
   return {

@@ -27,7 +27,8 @@ export class Watch {
     this.stop.hidden = false;
     this.place.textContent = `${participant}: waiting for what comes next`;
     this.ask(participant);
-    document.getElementById("session")?.scrollIntoView({ block: "nearest" });
+    // In one column the session is above the participants.
+    document.getElementById("session")?.scrollIntoView({ block: matchMedia("(max-width: 1100px)").matches ? "start" : "nearest" });
   }
 
   leave() {

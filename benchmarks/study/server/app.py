@@ -72,7 +72,8 @@ def create_app(
     try:
         for mode in modes:
             store = Store(database_path(study.folder, mode), mode=mode, name=study.content.name)
-            hubs[mode] = Hub(Context(study, store, secrets, now=now, pace=pace))
+            own = secrets.of_database(mode, store.value("created"))
+            hubs[mode] = Hub(Context(study, store, own, now=now, pace=pace))
     except BaseException:
         close_stores(hubs)
         raise

@@ -34,9 +34,11 @@ def find_code(folder: Path, code: str) -> list[str]:
             if not database_path(folder, mode).is_file():
                 continue
             database = stack.enter_context(open_readonly(database_path(folder, mode)))
+            created = database.execute("SELECT value FROM study WHERE key = 'created'").fetchone()[0]
+            own = secrets.of_database(mode, created)
             for row in database.execute("SELECT participant, state FROM participants ORDER BY participant"):
                 for ending in ENDINGS:
-                    if secrets.is_code(code, row["participant"], ending):
+                    if own.is_code(code, row["participant"], ending):
                         is_so = "as the database says" if row["state"] == ending else f"the database: {row['state']}"
                         found.append(f"{row['participant']}: {ending} ({is_so})")
     return found

@@ -13,7 +13,7 @@ from benchmarks.study.store import Store
 
 if TYPE_CHECKING:
     from benchmarks.study.design.study import Study
-    from benchmarks.study.server.secrets import Secrets
+    from benchmarks.study.server.secrets import DatabaseSecrets
 
 __all__ = ["Context", "Pace"]
 
@@ -50,14 +50,14 @@ class Context:
     Attributes:
         study: The design.
         store: The database.
-        secrets: Of the study.
+        secrets: Of the database.
         now: Seconds since 1970.
         pace: Limits of connections.
     """
 
     study: Study
     store: Store
-    secrets: Secrets
+    secrets: DatabaseSecrets
     now: Callable[[], float] = time.time
     pace: Pace = field(default_factory=Pace)
 

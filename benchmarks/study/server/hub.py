@@ -99,11 +99,11 @@ class Hub:
         async with self._joining:
             known = self._known(worker)
             if known is not None:
-                return context.secrets.token(context.store.mode, known)
+                return context.secrets.token(known)
             if not is_open(context.study, context.store):
                 raise NotAdmitted("closed")
             participant = await self._add(worker)
-        return context.secrets.token(context.store.mode, participant)
+        return context.secrets.token(participant)
 
     def _known(self, worker: Worker) -> str | None:
         """The participant that a worker is already; one who has ended only where nobody may take part twice."""
@@ -132,7 +132,7 @@ class Hub:
         row = {
             "participant": participant,
             "design": context.study.design_hash,
-            "token_sha256": fingerprint(context.secrets.token(store.mode, participant)),
+            "token_sha256": fingerprint(context.secrets.token(participant)),
             "order_number": order_number,
             "conditions": json.dumps(list(order)),
             "seed": seed,

@@ -14,7 +14,7 @@ from benchmarks.study.server.completion import counted_rounds, missing
 from benchmarks.study.server.play import Play
 from benchmarks.study.server.refusal import Refused
 from benchmarks.study.server.screens import describe
-from benchmarks.study.store import rows
+from benchmarks.study.store import NoParticipant, rows
 from benchmarks.study.store.outcomes import counted_outcome
 from benchmarks.study.timeline import GAMES, Ending, Screen, timeline
 
@@ -202,8 +202,19 @@ class Progress:
         self._forget_game()
 
     async def _write(self, *statements: Statement) -> None:
-        if statements:
-            await self.context.store.write(*statements)
+        """Put rows on disk; of somebody who was forgotten meanwhile, nothing is written any more.
+
+        Raises:
+            Refused: The database does not know the participant any more.
+            sqlite3.Error: It could not be stored.
+        """
+        if not statements:
+            return
+        try:
+            await self.context.store.write(*statements, of=self.participant)
+        except NoParticipant as error:
+            self._forget_game()
+            raise Refused("unknown participant", fatal=True) from error
 
     async def log(self, kind: str, /, **detail: Any) -> None:
         """Keep an event."""

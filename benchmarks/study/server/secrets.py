@@ -16,7 +16,7 @@ from typing import Final
 from benchmarks.study.errors import StudyError
 from legible_envs.support.plain_data import parse_json
 
-__all__ = ["Secrets"]
+__all__ = ["DatabaseSecrets", "Secrets", "fingerprint"]
 
 _FILE: Final = "secret.json"
 _BYTES: Final = 32
@@ -24,7 +24,7 @@ _BYTES: Final = 32
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Secrets:
-    """The secret of a study, and what is made from it.
+    """The secret of a study, and what is made from it for researchers.
 
     Attributes:
         key: Of all HMACs.
@@ -57,26 +57,44 @@ class Secrets:
             raise StudyError(f"{path} is damaged: its key has {len(key)} bytes instead of {_BYTES}")
         return cls(key)
 
-    def _mac(self, *words: str) -> bytes:
-        return hmac.new(self.key, json.dumps(words).encode(), hashlib.sha256).digest()
-
-    def token(self, mode: str, participant: str) -> str:
-        """What lets a browser act for a participant: 192 bits."""
-        return _letters(self._mac("participant", mode, participant)[:24])
-
     @property
     def admin(self) -> str:
         """What lets a researcher watch."""
-        return _letters(self._mac("admin")[:24])
+        return _letters(_mac(self.key, "admin")[:24])
 
     @property
     def debug(self) -> str:
         """What lets anybody join as a debug participant."""
-        return _letters(self._mac("debug")[:12])
+        return _letters(_mac(self.key, "debug")[:12])
+
+    def of_database(self, mode: str, created: str) -> DatabaseSecrets:
+        """What is made for the participants of one database.
+
+        Args:
+            mode: ``"live"`` or ``"debug"``.
+            created: When it was made, as its table ``study`` has it. Numbers of participants begin again in a new
+                database; links and codes of the one before must not fit them.
+        """
+        return DatabaseSecrets(_mac(self.key, "database", mode, created))
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class DatabaseSecrets:
+    """What is made for the participants of one database; see :meth:`Secrets.of_database`.
+
+    Attributes:
+        key: Of the HMACs of this database.
+    """
+
+    key: bytes
+
+    def token(self, participant: str) -> str:
+        """What lets a browser act for a participant: 192 bits."""
+        return _letters(_mac(self.key, "participant", participant)[:24])
 
     def code(self, participant: str, ending: str) -> str:
         """The completion code of a participant: 50 bits as ``ABCDE-FGHIJ``."""
-        text = base64.b32encode(self._mac("code", participant, ending)).decode()[:10]
+        text = base64.b32encode(_mac(self.key, "code", participant, ending)).decode()[:10]
         return f"{text[:5]}-{text[5:]}"
 
     def is_code(self, code: str, participant: str, ending: str) -> bool:
@@ -87,6 +105,10 @@ class Secrets:
 def fingerprint(token: str) -> str:
     """What is stored of a token."""
     return hashlib.sha256(token.encode("utf-8", "surrogatepass")).hexdigest()
+
+
+def _mac(key: bytes, *words: str) -> bytes:
+    return hmac.new(key, json.dumps(words).encode(), hashlib.sha256).digest()
 
 
 def _letters(content: bytes) -> str:

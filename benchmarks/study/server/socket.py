@@ -110,13 +110,13 @@ class _Visitor:
             await _dismiss(self.line, "something went wrong", 1011)
         finally:
             self.hub.detach(session, self.connection)
-            with contextlib.suppress(sqlite3.Error):
+            with contextlib.suppress(sqlite3.Error, Refused):
                 await session.log("disconnect")
 
     async def _failed(self, error: Exception) -> None:
         """Keep an error that nobody expected, for the monitor and for the log of the server."""
         _log.error("participant %s: %s", self.session.participant, type(error).__name__, exc_info=error)
-        with contextlib.suppress(sqlite3.Error):
+        with contextlib.suppress(sqlite3.Error, Refused):
             await self.session.log("error", error=f"{type(error).__name__}: {error}"[:1000])
 
     async def _listen(self) -> None:
@@ -168,6 +168,12 @@ class _Visitor:
             await self.session.log(kind, **detail)
 
     async def _watch_idle(self) -> None:
+        try:
+            await self._end_idle()
+        except Refused as refusal:  # they were forgotten meanwhile
+            await _dismiss(self.line, str(refusal), 4401)
+
+    async def _end_idle(self) -> None:
         """Warn a participant who does nothing, then end their session."""
         limits, session, connection = self.hub.context.study.content.limits, self.session, self.connection
         warned_at = -1.0

@@ -22,12 +22,13 @@ from benchmarks.study.errors import StudyError
 from benchmarks.study.store.joining import Statement, is_many, joined
 from benchmarks.study.store.schema import SCHEMA, TABLES
 
-__all__ = ["Mode", "Statement", "Store", "database_path", "open_readonly"]
+__all__ = ["Mode", "NoParticipant", "Statement", "Store", "database_path", "open_readonly"]
 
 Mode = Literal["live", "debug"]
 _Result = TypeVar("_Result")
 
 _MOST_AT_ONCE: Final = 512
+_KNOWN: Final = "SELECT 1 FROM participants WHERE participant = ?"
 _WAIT: Final = 30.0
 """Seconds to wait for another process, such as one that forgets a participant."""
 
@@ -64,8 +65,13 @@ def _check_schema(connection: sqlite3.Connection, path: Path) -> None:
         raise StudyError(f"{path} has tables of version {row and row[0]}; this program reads version {SCHEMA}")
 
 
+class NoParticipant(sqlite3.IntegrityError):
+    """Rows are of a participant whom the database does not know: they are forgotten. Nothing was written."""
+
+
 class _Job(NamedTuple):
     statements: Sequence[Statement]
+    of: str
     done: asyncio.Future[None]
     loop: asyncio.AbstractEventLoop
 
@@ -134,17 +140,22 @@ class Store:
 
     # -- writing ------------------------------------------------------------------------------------------------------
 
-    async def write(self, *statements: Statement) -> None:
+    async def write(self, *statements: Statement, of: str = "") -> None:
         """Execute statements together; returns once they are on disk.
 
+        Args:
+            *statements: What to write.
+            of: The participant that all of it is about, if it is about one who has a row.
+
         Raises:
-            sqlite3.Error: None of them is.
+            NoParticipant: This participant has no row.
+            sqlite3.Error: None of them is on disk.
         """
         if self._closed:
             raise sqlite3.ProgrammingError("the database is closed")
         loop = asyncio.get_running_loop()
         done: asyncio.Future[None] = loop.create_future()
-        self._jobs.put(_Job(statements, done, loop))
+        self._jobs.put(_Job(statements, of, done, loop))
         await done
 
     def write_now(self, *statements: Statement) -> None:
@@ -209,6 +220,8 @@ class Store:
         connection = self._writer
         connection.execute("SAVEPOINT job")
         try:
+            if job.of and not connection.execute(_KNOWN, [job.of]).fetchone():
+                raise NoParticipant(f"there is no participant {job.of}")
             for sql, values in job.statements:
                 if is_many(values):
                     connection.executemany(sql, values)

@@ -39,7 +39,7 @@ def test_a_whole_study_by_keyboard(open_page: Callable[..., Page], write_study: 
         store = server.config.app.state.hubs["live"].context.store  # type: ignore[union-attr]
         (state,) = rows(store, "SELECT participant, state FROM participants")
         assert state == ("P001", "complete")
-        assert code == server.config.app.state.secrets.code("P001", "complete")  # type: ignore[union-attr]
+        assert code == server.config.app.state.hubs["live"].context.secrets.code("P001", "complete")  # type: ignore[union-attr]
         taken = rows(store, "SELECT key_down, frame_shown, received FROM steps ORDER BY visit, step")
         assert len(taken) == 2 * len(SMALL_WAY) + len(LEGIBLE_WAY)
         # A key goes down after the state that it acts on was shown, never before.

@@ -209,7 +209,7 @@ def test_codes_are_a_participants_own_and_can_be_verified_later(tmp_path: Path) 
         for _ in range(2):
             with server.page(server.join()) as page:
                 codes.append(page.finish()["code"])
-        secrets = server.app.state.secrets
+        secrets = server.app.state.hubs["live"].context.secrets
         assert codes[0] != codes[1]
         assert secrets.is_code(f" {codes[0].lower()} ", "P001", "complete")
         assert not secrets.is_code(codes[0], "P002", "complete")
