@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
@@ -12,6 +11,7 @@ from typing import Any, Final
 from urllib.parse import quote
 
 from benchmarks.study.design.study import Study
+from benchmarks.study.store.values import from_row
 
 __all__ = [
     "Answer",
@@ -91,7 +91,7 @@ class VisitRow:
         """
         if self.outcome is None:
             return {}
-        found = json.loads(self.outcome)
+        found = from_row(self.outcome)
         if not isinstance(found, dict):
             raise ValueError(f"the outcome of visit {self.visit} must be a mapping, got {self.outcome!r:.80}")
         return found
@@ -160,7 +160,7 @@ def people(connection: sqlite3.Connection) -> list[PersonRow]:
 
 def _names(text: object) -> tuple[str, ...]:
     try:
-        found = json.loads(str(text))
+        found = from_row(str(text))
     except ValueError:
         return ()
     return tuple(found) if isinstance(found, list) and all(isinstance(name, str) for name in found) else ()

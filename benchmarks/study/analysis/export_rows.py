@@ -17,6 +17,7 @@ from benchmarks.study.analysis.replaying import game_visits
 from benchmarks.study.analysis.scales import attention, score
 from benchmarks.study.design.study import Study
 from benchmarks.study.store.outcomes import counted_outcome
+from benchmarks.study.store.values import from_row
 from benchmarks.study.timeline import timeline
 
 if TYPE_CHECKING:
@@ -168,7 +169,7 @@ def _add_steps(
     is_kitchen = study.content.domain == "overcooked"
     for step in steps_of(connection, visit.visit):
         try:
-            action = json.loads(step.action)
+            action = from_row(step.action)
             moved = {"action": action} if is_kitchen else dict(zip(("vx", "vy"), action, strict=True))
             if not all(isinstance(value, int | float) for value in moved.values()):
                 raise ValueError(f"{step.action!r:.80} is no action")
@@ -198,7 +199,7 @@ def _add_answers(
         try:
             if visit is None:
                 raise ValueError(f"there is no visit {answer.visit} of this participant")
-            value = redaction(json.loads(answer.value))
+            value = redaction(from_row(answer.value))
             told = json.dumps(value, ensure_ascii=False) if isinstance(value, list | dict) else value
             row = {key: value for key, value in _place(study, visit).items() if key in COLUMNS["questionnaires"]}
             row |= {"questionnaire": answer.questionnaire, "item": answer.item, "value": told}
@@ -227,7 +228,7 @@ def _add_events(found: PersonRows, connection: sqlite3.Connection, person: Perso
     )
     for event, at, kind, detail in rows:
         try:
-            told = json.dumps(redaction(json.loads(detail)), ensure_ascii=False)
+            told = json.dumps(redaction(from_row(detail)), ensure_ascii=False)
             row = {"participant": person.participant, "at": moment(at), "kind": redaction(kind), "detail": told}
             found.tables["events"].append(row)
         except (ValueError, TypeError, RecursionError) as error:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sqlite3
 import warnings
 from collections.abc import Sequence
@@ -11,6 +10,8 @@ from typing import Any
 from benchmarks.study.analysis.database import PersonRow, VisitRow, steps_of, visits_of
 from benchmarks.study.analysis.replaying import ReplayError, begin
 from benchmarks.study.design.study import Study
+from benchmarks.study.store.values import from_row
+from legible_envs.support.plain_data import parse_json
 
 __all__ = ["write_minari"]
 
@@ -75,7 +76,7 @@ def _environment(
         }
     settings = content.table.model_dump()
     task = settings["task"]
-    most = max(len(json.loads(text).get("obstacles", ())) for text in study.layouts.values())
+    most = max(len(parse_json(text).get("obstacles", ())) for text in study.layouts.values())
     robot: dict[str, Any] = {}
     if content.partner is not None:
         robot["partner"] = content.partner.kind
@@ -101,7 +102,7 @@ def _record(
         recorder.reset(seed=visit.seed, options={"layout": game.env.layout})
         recorder.participant, recorder.condition = person.participant, visit.condition  # of the episode just begun
         for step in steps_of(connection, visit.visit):
-            action = game.read_action(json.loads(step.action))
+            action = game.read_action(from_row(step.action))
             if study.content.domain == "tabletop":
                 import numpy as np
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-import json
 import math
 import sqlite3
 from collections.abc import Sequence
@@ -17,6 +16,7 @@ import numpy.typing as npt
 from benchmarks.study.analysis.database import PersonRow, StepRow, VisitRow, steps_of
 from benchmarks.study.analysis.replaying import ReplayError, begin, play
 from benchmarks.study.design.study import Study
+from benchmarks.study.store.values import from_row
 
 if TYPE_CHECKING:
     from benchmarks.study.games.base import Game
@@ -110,7 +110,7 @@ def _kitchen_idle(seconds: Floats) -> float:
 
 
 def _table_idle(game: Game, steps: Sequence[StepRow]) -> float:
-    speeds = [math.hypot(*game.read_action(json.loads(row.action))) for row in steps]
+    speeds = [math.hypot(*game.read_action(from_row(row.action))) for row in steps]
     return float(np.mean(np.array(speeds) < IDLE_SPEED)) if speeds else math.nan
 
 

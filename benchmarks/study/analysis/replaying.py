@@ -13,6 +13,7 @@ from benchmarks.study.design.study import Study
 from benchmarks.study.games import make_game, reaches_left
 from benchmarks.study.games.base import Game
 from benchmarks.study.store.outcomes import RESTARTED, counted_outcome
+from benchmarks.study.store.values import from_row
 from benchmarks.study.timeline import GAMES, Screen, timeline
 
 __all__ = ["Mismatch", "ReplayError", "Verified", "begin", "game_visits", "play", "replay", "screen_of", "verify"]
@@ -124,7 +125,7 @@ def play(game: Game, steps: Iterable[StepRow]) -> Iterator[tuple[StepRow, str]]:
             raise ReplayError(f"step {number} is missing: the next row is step {row.step}")
         yield row, game.digest()
         try:
-            game.step(game.read_action(json.loads(row.action)))
+            game.step(game.read_action(from_row(row.action)))
         except (ValueError, TypeError, RecursionError) as error:
             raise ReplayError(f"step {number} cannot be taken: {error}") from error
 
@@ -202,7 +203,7 @@ def compare(
             count += 1
         if visit.finished is None:
             return count, []
-        ours, stored = json.loads(json.dumps(game.outcome())), visit.result
+        ours, stored = from_row(json.dumps(game.outcome())), visit.result
         stored.pop(RESTARTED, None)  # the server's note that the participant began the round again
         other = [key for key in {**ours, **stored} if ours.get(key) != stored.get(key)]
         if other:

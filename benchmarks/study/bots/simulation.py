@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import json
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -16,6 +15,7 @@ from benchmarks.study.bots.people import POPULATIONS, Person
 from benchmarks.study.bots.process import ServerProcess, without_gaps
 from benchmarks.study.errors import StudyError
 from benchmarks.study.store import database_path, open_readonly
+from benchmarks.study.store.values import from_row
 from benchmarks.study.timeline import timeline
 
 if TYPE_CHECKING:
@@ -207,7 +207,7 @@ def _row_problems(study: Study, connection: Any, ending: dict[str, str]) -> list
         row = stored[name]
         if row["state"] != ("active" if expected == "left" else expected):
             found.append(f"{name} has state {row['state']!r}, the bot saw {expected!r}")
-        if sorted(json.loads(row["conditions"])) != sorted(study.conditions):
+        if sorted(from_row(row["conditions"])) != sorted(study.conditions):
             found.append(f"{name} has conditions {row['conditions']}")
         if expected == "complete" and (gone := missing(_Rows(connection), study, name)):  # type: ignore[arg-type]
             found.append(f"{name} is complete without rows of {', '.join(gone)}")

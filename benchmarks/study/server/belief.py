@@ -6,7 +6,6 @@ The copy is fed from the database, in a thread, while somebody watches; the part
 from __future__ import annotations
 
 import dataclasses
-import json
 import sqlite3
 import threading
 from collections.abc import Mapping
@@ -18,6 +17,7 @@ import numpy as np
 from benchmarks.study.games import make_game, reaches_left
 from benchmarks.study.server.completion import counted_rounds
 from benchmarks.study.store import open_readonly
+from benchmarks.study.store.values import from_row
 from benchmarks.study.timeline import timeline
 from legible_envs.overcooked.grid import NEIGHBOURS
 from legible_envs.overcooked.trajectories import dispensers_in_reach
@@ -183,14 +183,14 @@ class BeliefFollower:
                 "SELECT action FROM steps WHERE visit = ? AND step >= ? ORDER BY step", (self._visit, self._game.steps)
             ).fetchall()
         for row in steps:
-            self._game.step(self._game.read_action(json.loads(row["action"])))
+            self._game.step(self._game.read_action(from_row(row["action"])))
             if self._walk is not None:
                 self._walk.follow()
         return {"n": self._game.steps, "goals": self._goals()}
 
     def _begin(self, database: sqlite3.Connection, participant: str, visit: sqlite3.Row) -> None:
         person = database.execute("SELECT conditions FROM participants WHERE participant = ?", (participant,))
-        screens = timeline(self._study, json.loads(person.fetchone()["conditions"]))
+        screens = timeline(self._study, from_row(person.fetchone()["conditions"]))
         visits = database.execute("SELECT * FROM visits WHERE participant = ? ORDER BY visit", (participant,))
         screen = screens[visit["screen"]]
         left = reaches_left(self._study, screen, counted_rounds(screens, visits.fetchall()))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sqlite3
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from benchmarks.study.design.questionnaires import answered_names
 from benchmarks.study.games import reaches_left
 from benchmarks.study.store.outcomes import counted_outcome
+from benchmarks.study.store.values import from_row
 from benchmarks.study.timeline import GAMES, Screen, timeline
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def missing(store: Store, study: Study, participant: str) -> list[str]:
     row = store.read("SELECT conditions FROM participants WHERE participant = ?", (participant,))
     if not row:
         return ["participant"]
-    screens = timeline(study, json.loads(row[0]["conditions"]))
+    screens = timeline(study, from_row(row[0]["conditions"]))
     visits = store.read("SELECT * FROM visits WHERE participant = ? ORDER BY visit", (participant,))
     last = {visit["screen"]: visit for visit in visits if _outcome(visit) is not None}
     rounds = counted_rounds(screens, visits)
@@ -80,7 +80,7 @@ def missing(store: Store, study: Study, participant: str) -> list[str]:
 
 def _is_whole(store: Store, study: Study, screen: Screen, visit: sqlite3.Row) -> bool:
     """Whether a finished visit has all its rows."""
-    number, outcome = visit["visit"], json.loads(visit["outcome"])
+    number, outcome = visit["visit"], from_row(visit["outcome"])
     if screen.kind in GAMES:
         # By visit, which is the key of the table: the cost does not grow with the participants.
         found = store.read("SELECT COUNT(*), MAX(step) FROM steps WHERE visit = ?", (number,))[0]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sqlite3
 import time
 from collections import Counter
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from benchmarks.study.store import open_readonly
+from benchmarks.study.store.values import from_row
 from benchmarks.study.timeline import timeline
 
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ class Overviews:
             "participant": participant,
             "state": row["state"],
             "order_number": row["order_number"],
-            "conditions": json.loads(row["conditions"]),
+            "conditions": from_row(row["conditions"]),
             "screen": min(int(row["screen"]), len(screens)) if screens else int(row["screen"]),
             "screens": len(screens),
             "name": "" if screen is None or row["state"] != "active" else screen.name,
@@ -120,7 +120,7 @@ class Overviews:
         }
 
     def _screens_of(self, conditions: str) -> tuple[Any, ...]:
-        return tuple(timeline(self._study, json.loads(conditions)))
+        return tuple(timeline(self._study, from_row(conditions)))
 
     def _add_attention(self, database: sqlite3.Connection, people: Sequence[dict[str, Any]]) -> None:
         """How many attention checks each participant has passed, of how many."""
@@ -140,7 +140,7 @@ class Overviews:
             answer = expected.get((row["questionnaire"], row["item"]))
             if answer is not None:
                 asked_of[row["participant"]] += 1
-                right[row["participant"]] += json.loads(row["value"]) == answer
+                right[row["participant"]] += from_row(row["value"]) == answer
         for person in people:
             person["attention"] = [right[person["participant"]], asked_of[person["participant"]]]
 
@@ -152,7 +152,7 @@ class Overviews:
             "WHERE design = ? GROUP BY order_number, conditions, state"
         )
         for row in database.execute(sql, (self._study.design_hash,)):
-            number, conditions = row["order_number"], json.loads(row["conditions"])
+            number, conditions = row["order_number"], from_row(row["conditions"])
             order = found.setdefault(
                 number, {"number": number, "conditions": conditions, "complete": 0, "active": 0, "ended": 0}
             )

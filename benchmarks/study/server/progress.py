@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import hashlib
-import json
 import sqlite3
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
@@ -16,6 +15,7 @@ from benchmarks.study.server.refusal import Refused
 from benchmarks.study.server.screens import describe
 from benchmarks.study.store import NoParticipant, rows
 from benchmarks.study.store.outcomes import counted_outcome
+from benchmarks.study.store.values import from_row
 from benchmarks.study.timeline import GAMES, Ending, Screen, timeline
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ class Progress:
         self.context = context
         self.participant = participant
         row = context.store.read("SELECT * FROM participants WHERE participant = ?", (participant,))[0]
-        self.order: list[str] = json.loads(row["conditions"])
+        self.order: list[str] = from_row(row["conditions"])
         self.seed = int(row["seed"])
         self.design = str(row["design"])
         self.index = int(row["screen"])
@@ -99,7 +99,7 @@ class Progress:
         visit = int(unfinished[-1]["visit"])
         if screen.kind in GAMES:
             steps = self.context.store.read("SELECT action FROM steps WHERE visit = ? ORDER BY step", (visit,))
-            actions = [json.loads(row["action"]) for row in steps]
+            actions = [from_row(row["action"]) for row in steps]
             game = await asyncio.to_thread(
                 self._played, screen, int(unfinished[-1]["seed"]), actions, self._counted_rounds()
             )

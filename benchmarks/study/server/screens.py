@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING, Any, Protocol
 from urllib.parse import quote
 
+from benchmarks.study.store.values import from_row
 from benchmarks.study.timeline import GAMES
 
 if TYPE_CHECKING:
@@ -111,7 +111,7 @@ def _end(session: Place) -> dict[str, Any]:
         "url": url.replace("{participant}", session.participant) if is_live else "",
     }
     if ending == "device_failed":
-        checks = [json.loads(row["outcome"]) for row in session.visits() if row["kind"] == "device" and row["outcome"]]
+        checks = [from_row(row["outcome"]) for row in session.visits() if row["kind"] == "device" and row["outcome"]]
         found["failed"] = checks[-1].get("failed", []) if checks else []
     return found
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import hashlib
-import json
 from collections.abc import AsyncIterator
 from typing import TYPE_CHECKING, Any, Final
 
@@ -18,6 +17,7 @@ from benchmarks.study.server.refusal import Refused
 from benchmarks.study.server.screens import describe
 from benchmarks.study.store import rows
 from benchmarks.study.store.outcomes import RESTARTED
+from benchmarks.study.store.values import from_row
 from benchmarks.study.timeline import GAMES, Screen
 
 if TYPE_CHECKING:
@@ -112,7 +112,7 @@ class Session(Progress):
             "SELECT detail FROM events WHERE participant = ? AND kind = 'connect' ORDER BY event DESC LIMIT 1",
             (self.participant,),
         )
-        return str(json.loads(found[0]["detail"]).get("tab", "")) if found else ""
+        return str(from_row(found[0]["detail"]).get("tab", "")) if found else ""
 
     async def _restore(self, *, is_same_page: bool) -> None:
         """Take up the open visit where the database has it, as far as the study's policy lets a page be reloaded."""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
+
+from benchmarks.study.store.values import from_row
 
 __all__ = ["RESTARTED", "counted_outcome"]
 
@@ -23,7 +24,7 @@ def counted_outcome(finished: float | None, outcome: str | None) -> dict[str, An
     """
     if finished is None:
         return None
-    found = json.loads(outcome or "{}")
+    found = from_row(outcome or "{}")
     if not isinstance(found, dict):
         raise ValueError(f"the outcome of a visit must be a mapping, got {outcome!r:.80}")
     return None if found.get(RESTARTED) else found

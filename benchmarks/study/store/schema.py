@@ -1,4 +1,4 @@
-"""The tables of a study's database. Times are seconds since 1970 (UTC); what browsers tell is milliseconds of their own."""
+"""The tables of a study's database. Times are seconds since 1970 (UTC); those of browsers are milliseconds of their own."""
 
 from __future__ import annotations
 
@@ -13,7 +13,12 @@ TABLES: Final = """
 CREATE TABLE study (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
 
 -- Texts that participants agreed to, word by word.
-CREATE TABLE texts (sha256 TEXT PRIMARY KEY, name TEXT NOT NULL, text TEXT NOT NULL, stored REAL NOT NULL) WITHOUT ROWID;
+CREATE TABLE texts (
+  sha256 TEXT PRIMARY KEY,
+  name TEXT NOT NULL,
+  text TEXT NOT NULL,
+  stored REAL NOT NULL
+) WITHOUT ROWID;
 
 -- One row a participant: P001, P002, ... (debug: D001, ...). `state` is active, or the ending.
 CREATE TABLE participants (

@@ -32,7 +32,7 @@ def _without(reason: str) -> None:
     pytest.skip(reason)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")  # Playwright keeps an event loop running in its thread while it is open
 def browser() -> Iterator[Browser]:
     """A Chromium without a window; without one tests are skipped, or fail with ``LEGIBLE_REQUIRE_BROWSER=1``."""
     try:
