@@ -1,4 +1,4 @@
-"""The tables of a study's database. Times are seconds since 1970 (UTC); those of browsers are milliseconds of their own."""
+"""The tables of a study's database. Times are seconds since 1970 (UTC); browsers tell milliseconds of their own."""
 
 from __future__ import annotations
 

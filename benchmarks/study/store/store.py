@@ -1,8 +1,8 @@
 """The database of a study: rows are acknowledged once they are on disk, many of them at a time.
 
 One thread writes. It takes whatever waits, puts it into one transaction and commits that (``synchronous=FULL``), so
-that the price of a commit is shared by everybody who acts at the same moment. What awaits :meth:`Store.write` goes on when
-its rows would survive a loss of power.
+that the price of a commit is shared by everybody who acts at the same moment. What awaits :meth:`Store.write` goes on
+when its rows would survive a loss of power.
 """
 
 from __future__ import annotations
