@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +12,7 @@ from urllib.parse import quote
 
 from benchmarks.study.design.study import Study
 from benchmarks.study.store.values import from_row
+from benchmarks.study.timeline import timeline
 
 __all__ = [
     "Answer",
@@ -21,6 +22,7 @@ __all__ = [
     "answers_of",
     "check_design",
     "database_path",
+    "needed_screens",
     "people",
     "read_only",
     "steps_of",
@@ -222,3 +224,15 @@ def check_design(study: Study, rows: list[PersonRow], wanted: str | None = None)
             "they were"
         )
     return [row for row in rows if row.design == taken]
+
+
+def needed_screens(study: Study, person: PersonRow, done: Collection[int]) -> int:
+    """How many screens a participant has to go through; a round that was passed over, its reaches made, is none.
+
+    Args:
+        study: The design.
+        person: The participant.
+        done: Indices of the screens that they have finished.
+    """
+    screens = timeline(study, person.conditions)
+    return sum(i >= person.screen or i in done or screen.kind != "round" for i, screen in enumerate(screens))

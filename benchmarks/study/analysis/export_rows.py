@@ -10,7 +10,15 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any, Final
 
-from benchmarks.study.analysis.database import Answer, PersonRow, VisitRow, answers_of, steps_of, visits_of
+from benchmarks.study.analysis.database import (
+    Answer,
+    PersonRow,
+    VisitRow,
+    answers_of,
+    needed_screens,
+    steps_of,
+    visits_of,
+)
 from benchmarks.study.analysis.played import PlayedVisit, played
 from benchmarks.study.analysis.redaction import Redaction
 from benchmarks.study.analysis.replaying import game_visits
@@ -251,7 +259,7 @@ def _person(
         "ended": moment(person.ended),
         "minutes": round((until - person.joined) / 60, 2),
         "screens_done": len(done),
-        "screens": len(timeline(study, person.conditions)),
+        "screens": needed_screens(study, person, done),
         "order_number": person.order_number,
         "order": " > ".join(person.conditions),
         "attention_passed": passed[0],

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from benchmarks.csv_tables import csv_of
-from benchmarks.study.analysis.database import BUSY, PersonRow, people, read_only, visits_of
+from benchmarks.study.analysis.database import BUSY, PersonRow, needed_screens, people, read_only, visits_of
 from benchmarks.study.analysis.export_rows import moment
 from benchmarks.study.design.study import Study
 from benchmarks.study.timeline import timeline
@@ -207,7 +207,7 @@ def _progress(study: Study, connection: sqlite3.Connection, person: PersonRow) -
         "participant": person.participant,
         "state": person.state,
         "screens_done": len(done),
-        "screens": len(screens),
+        "screens": needed_screens(study, person, done),
         # Rounds that were not needed are screens that nobody saw.
         "share": 1.0 if complete else round(min(person.screen, len(screens)) / len(screens), 3),
         "rounds_done": sum(screen.kind == "round" for i, screen in enumerate(screens) if i in done),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import hashlib
 import json
 import re
@@ -13,6 +14,7 @@ from typing import Any
 import pytest
 
 from benchmarks.study.analysis import export as exporting
+from benchmarks.study.analysis.database import PersonRow, needed_screens
 from benchmarks.study.analysis.export import export
 from benchmarks.study.analysis.export_files import GrowingTable
 from benchmarks.study.analysis.export_rows import COLUMNS
@@ -21,6 +23,7 @@ from benchmarks.study.analysis.redaction import REMOVED, Redaction
 from benchmarks.study.analysis.scales import attention, score
 from benchmarks.study.design.questionnaires import Questionnaire
 from benchmarks.study.design.study import Study
+from benchmarks.study.timeline import timeline
 from legible_envs.rollouts import load_trajectories, record_episode
 from tests.support.recorded_study import (
     Recorder,
@@ -354,3 +357,15 @@ def test_an_empty_study_exports_empty_tables(tmp_path: Path) -> None:
     new_database(path).close()
     assert export(study, path, tmp_path / "out").counts["participants"] == 0
     assert load_trajectories(tmp_path / "out" / "trajectories.npz") == []
+
+
+def test_rounds_that_were_passed_over_are_no_screens_to_go_through(tmp_path: Path) -> None:
+    study = kitchen_study(tmp_path)
+    screens = timeline(study, study.conditions)
+    rounds = [i for i, screen in enumerate(screens) if screen.kind == "round"]
+    person = PersonRow("P001", "", 0, tuple(study.conditions), 0, 0.0, 0.0, len(screens), "complete", None, "en")
+    everything = set(range(len(screens)))
+    assert needed_screens(study, person, everything) == len(screens)
+    assert needed_screens(study, person, everything - {rounds[0]}) == len(screens) - 1
+    at_first = dataclasses.replace(person, screen=0, state="active")  # what lies ahead may be needed
+    assert needed_screens(study, at_first, set()) == len(screens)
