@@ -24,9 +24,12 @@ if TYPE_CHECKING:
 __all__ = ["result_tables", "sections_of"]
 
 _LAYOUTS: Final = {
-    "layouts": "The layout of each condition. Where it can be said, shades show how often an observer who sees the "
+    "overcooked": "The kitchen of each condition. The darker a floor cell, the more often an observer who sees the "
     "person there would predict a wrong goal.",
+    "tabletop": "The table of each condition. Ribbons are the shortest reaches: the darker, the less an observer who "
+    "has seen the hand come so far believes in its true goal.",
 }
+"""What the pictures of layouts show, by domain."""
 
 
 def result_tables(found: Findings) -> dict[str, pd.DataFrame]:
@@ -87,7 +90,7 @@ def sections_of(study: Study, found: Findings, settings: AnalysisSettings, folde
     """All sections, their figures drawn into a folder."""
     parts = [
         _participants(study, found),
-        Section("Layouts", "", {}, _layouts(study, folder), _LAYOUTS),
+        Section("Layouts", "", {}, _layouts(study, folder), {"layouts": _LAYOUTS[study.content.domain]}),
         _accuracy(study, found, settings, folder),
         _published(found, folder),
         _hypotheses(found, study, folder),
