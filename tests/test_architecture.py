@@ -104,6 +104,7 @@ TRUSTED = {
     "legible_envs/support/digests.py": {"json.loads"},  # what the line has just written
     "benchmarks/trials/store.py": {"json.loads"},  # what the line has just written
     "benchmarks/study/store/values.py": {"json.loads"},  # rows that the study's server wrote
+    "benchmarks/throughput/study.py": {"json.loads"},  # answers of a server that this process started
     "benchmarks/study/bots/link.py": {"json.loads"},  # answers of a server that this process started
     "benchmarks/experiments/optimizers/run.py": {"json.loads"},  # a key that this process made
     "benchmarks/throughput/predictors_grid.py": {"json.loads"},  # answers of a process that this one started
