@@ -1,6 +1,6 @@
 """Places that commands write to, checked while the command line is read: before any work is done.
 
-Every option that names such a place has one of the two types here. Folders that are missing are made when something is
+Every option that names such a place has one of the types here. Folders that are missing are made when something is
 written, not by the check.
 """
 
@@ -14,7 +14,7 @@ from typing import Any
 
 import click
 
-__all__ = ["DestinationFile", "DestinationFolder", "check_folder"]
+__all__ = ["DestinationFile", "DestinationFileOrFolder", "DestinationFolder", "check_folder"]
 
 _LONGEST = 200
 """Bytes of a name; systems allow 255, and files are written under longer names first."""
@@ -66,6 +66,24 @@ class DestinationFile(click.ParamType):
         except OSError:
             return _folder_problem(path)  # the way there is at fault
         return _folder_problem(path.parent) or _name_problem(path)
+
+
+class DestinationFileOrFolder(click.ParamType):
+    """A file of one kind, told by how its name ends, or else a folder.
+
+    Args:
+        suffix: How names of files end, whatever the case.
+    """
+
+    name = "path"
+
+    def __init__(self, suffix: str) -> None:
+        self.suffix = suffix
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        """The path, once it is sure that it can be written."""
+        is_file = Path(value).suffix.lower() == self.suffix
+        return (DestinationFile(self.suffix) if is_file else DestinationFolder()).convert(value, param, ctx)
 
 
 def check_folder(path: Path, option: str | None = None) -> None:

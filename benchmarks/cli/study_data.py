@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from benchmarks.cli.destinations import DestinationFile, DestinationFolder, check_folder
+from benchmarks.cli.destinations import DestinationFile, DestinationFileOrFolder, DestinationFolder, check_folder
 from benchmarks.cli.options import PositiveNumber
 from benchmarks.console import number as shown_number
 from benchmarks.console import plural, say, table, tell
@@ -311,7 +311,7 @@ def _print_power(found: Power, measure: str, source: str) -> None:
 @click.option("--round", "number", type=click.IntRange(min=1), metavar="N",
               help="Only this game, from 1, the practice among them. [default: all, one after the other]")  # fmt: skip
 @click.option("--speed", type=PositiveNumber(), default=1.0, show_default=True, help="Times as fast as it was played.")
-@click.option("--out", type=click.Path(path_type=Path), metavar="FILE.gif|FOLDER",
+@click.option("--out", type=DestinationFileOrFolder(".gif"), metavar="FILE.gif|FOLDER",
               help="Write a GIF, or PNG files into a folder, instead of opening a window.")  # fmt: skip
 def replay(folder: Path, participant: str, debug: bool, number: int | None, speed: float, out: Path | None) -> None:
     """Watch a participant's games again."""
@@ -320,9 +320,6 @@ def replay(folder: Path, participant: str, debug: bool, number: int | None, spee
     from benchmarks.study.analysis.database import read_only
     from benchmarks.study.analysis.watching import chosen_visits, frames_of, save_frames, show_frames
 
-    if out is not None:
-        destination: click.ParamType = DestinationFile(".gif") if out.suffix.lower() == ".gif" else DestinationFolder()
-        destination.convert(out, None, None)
     study, database = _opened(folder, debug)
     with read_only(database) as connection:
         person = _person(connection, participant)
@@ -401,7 +398,7 @@ def forget(folder: Path, participant: str, debug: bool, yes: bool) -> None:
 @click.command("hand-out")
 @study_folder
 @person_argument
-@click.option("--out", type=click.Path(path_type=Path), required=True, metavar="FILE.zip|FOLDER", help="Where to.")
+@click.option("--out", type=DestinationFileOrFolder(".zip"), required=True, metavar="FILE.zip|FOLDER", help="Where to.")
 @debug_option
 def hand_out(folder: Path, participant: str, out: Path, debug: bool) -> None:
     """Write everything that is stored about one participant.
@@ -410,8 +407,6 @@ def hand_out(folder: Path, participant: str, out: Path, debug: bool) -> None:
     """
     from benchmarks.study.analysis.person_data import hand_out as write
 
-    destination: click.ParamType = DestinationFile(".zip") if out.suffix.lower() == ".zip" else DestinationFolder()
-    destination.convert(out, None, None)
     study, database = _opened(folder, debug)
     found = write(study, database, participant, out)
     tell(f"{participant}: " + ", ".join(f"{count:,} {name}" for name, count in found.items()))

@@ -10,7 +10,7 @@ import click
 import pytest
 
 from benchmarks.cli.app import main
-from benchmarks.cli.destinations import DestinationFile, DestinationFolder, check_folder
+from benchmarks.cli.destinations import DestinationFile, DestinationFileOrFolder, DestinationFolder, check_folder
 from tests.support.command_line import legible
 
 KITCHEN = "XTXPXXX\nX     O\nX V   X\nC     X\nX   V F\nX     X\nXXDXSXX\n"
@@ -26,7 +26,9 @@ def _commands(group: click.Group, path: tuple[str, ...] = ()) -> Iterator[tuple[
 
 OPTIONS = [(path, parameter) for path, command in _commands(main) for parameter in command.params]
 DESTINATIONS = [
-    (path, option) for path, option in OPTIONS if isinstance(option.type, DestinationFile | DestinationFolder)
+    (path, option)
+    for path, option in OPTIONS
+    if isinstance(option.type, DestinationFile | DestinationFileOrFolder | DestinationFolder)
 ]
 
 
@@ -39,7 +41,9 @@ def test_every_path_is_read_and_must_exist_or_is_a_checked_destination() -> None
             assert (path, option) in DESTINATIONS, (path, option.name)
     writing = {path for path, _ in DESTINATIONS}
     assert writing == {("optimize",), ("score",), ("show",), ("play",), ("humans", "fetch"), ("humans", "evaluate"),
-                       ("sweep",), ("reproduce",), ("demo",), ("bench",)}  # fmt: skip
+                       ("sweep",), ("reproduce",), ("demo",), ("bench",),
+                       ("study", "new"), ("study", "export"), ("study", "analyse"), ("study", "replay"),
+                       ("study", "hand-out"), ("study", "progress")}  # fmt: skip
 
 
 @pytest.mark.parametrize("there", ["file/inside", "file/deep/inside", "/proc/inside", "/dev/null/inside", "link/inside",
@@ -59,10 +63,16 @@ def test_places_that_cannot_be_written_are_refused_before_the_work(
     before = sorted(tmp_path.rglob("*"))
     ending = option.type.suffixes[0] if isinstance(option.type, DestinationFile) and there else ""
     needed = {"optimize": ["overcooked"], "sweep": ["sweep.toml"], "reproduce": ["optimizers"],
-              "score": ["file"], "show": ["file"], "play": ["file"]}  # fmt: skip
-    result = legible(*path, *needed.get(path[-1], []), option.opts[0], there + ending)
+              "score": ["file"], "show": ["file"], "play": ["file"], "new": ["--domain", "overcooked"],
+              "export": ["."], "analyse": ["."], "progress": ["."], "replay": [".", "P001"],
+              "hand-out": [".", "P001"]}  # fmt: skip
+    place = [there + ending] if isinstance(option, click.Argument) else [option.opts[0], there + ending]
+    result = legible(*path, *needed.get(path[-1], []), *place)
     assert result.exit_code == 2, result.output
-    assert f"Invalid value for '{option.opts[0]}'" in result.output
+    assert (
+        f"Invalid value for '{option.make_metavar(click.Context(main)) if len(place) == 1 else option.opts[0]}'"
+        in result.output
+    )
     assert sorted(tmp_path.rglob("*")) == before
 
 

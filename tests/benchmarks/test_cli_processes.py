@@ -13,6 +13,8 @@ from typing import Any
 
 import pytest
 
+from tests.support.signals import hear_ctrl_c
+
 KITCHEN = "XTXPXXX\nX     O\nX V   X\nC     X\nX   V F\nX     X\nXXDXSXX\n"
 PROGRAM = (sys.executable, "-m", "benchmarks.cli.entry")
 
@@ -36,15 +38,10 @@ def _run(folder: Path, *arguments: str, **options: Any) -> subprocess.CompletedP
     return subprocess.run([*PROGRAM, *arguments], **{**given, **options})
 
 
-def _hear_ctrl_c() -> None:
-    """What runs in the background ignores Ctrl-C, and so do its children: the tests' own processes shall hear it."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-
-
 def _interrupted(folder: Path, arguments: tuple[str, ...], *delays: float) -> tuple[int, str]:
     """Start a command, send Ctrl-C to it and its children after each delay; its exit code and standard error."""
     process = subprocess.Popen([*PROGRAM, *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
-                               cwd=folder, start_new_session=True, preexec_fn=_hear_ctrl_c)  # fmt: skip
+                               cwd=folder, start_new_session=True, preexec_fn=hear_ctrl_c)  # fmt: skip
     for delay in delays:
         time.sleep(delay)
         if process.poll() is None:
@@ -123,7 +120,7 @@ def test_ctrl_c_waits_for_the_module_that_is_loaded(presses: int, code: int, sai
     (folder / "loading.py").write_text(MODULE.format(presses=presses))
     (folder / "program.py").write_text(LOADING)
     done = subprocess.run([sys.executable, "program.py"], cwd=folder, capture_output=True, text=True, check=False,
-                          timeout=60, preexec_fn=_hear_ctrl_c)  # fmt: skip
+                          timeout=60, preexec_fn=hear_ctrl_c)  # fmt: skip
     assert (done.returncode, done.stdout.strip()) == (code, said), done.stderr
     assert done.stderr == ("stopped\n" if code else "")
 
@@ -139,7 +136,7 @@ def test_ctrl_c_while_a_layout_is_scored(command: str, delay: float, folder: Pat
 def test_ctrl_c_during_a_search_says_how_to_go_on(folder: Path) -> None:
     process = subprocess.Popen([*PROGRAM, *LONG_COMMANDS["optimize"]], stdout=subprocess.DEVNULL,
                                stderr=subprocess.PIPE, text=True, cwd=folder, start_new_session=True,
-                               preexec_fn=_hear_ctrl_c)  # fmt: skip
+                               preexec_fn=hear_ctrl_c)  # fmt: skip
     deadline = time.monotonic() + 200
     while not (folder / "run" / "metrics.csv").exists() and time.monotonic() < deadline:
         time.sleep(0.1)

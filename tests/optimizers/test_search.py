@@ -20,6 +20,7 @@ from legible_envs.support.digests import sealed
 from optimizers import EmitterError, SearchError, load_run, make_archive, search
 from optimizers.archives import archive_arrays, read_archive
 from tests.support.shelf_workspace import ShelfWorkspace
+from tests.support.signals import hear_ctrl_c
 
 SHELF = ShelfWorkspace()
 OPTIMUM_5X5 = -11.684924681147868  # over all valid 5x5 layouts, prefix="sum", by exhaustive search
@@ -362,6 +363,7 @@ def test_ctrl_c_from_outside_leaves_a_usable_run(tmp_path):
     program = textwrap.dedent("""
         import sys
         from tests.support.shelf_workspace import ShelfWorkspace
+from tests.support.signals import hear_ctrl_c
         from optimizers import search
         started = lambda state: state.iteration == 5 and print("running", flush=True)
         search(ShelfWorkspace(), evaluations=10**9, checkpoint=sys.argv[1], callbacks=[started],
@@ -373,6 +375,7 @@ def test_ctrl_c_from_outside_leaves_a_usable_run(tmp_path):
         stderr=subprocess.PIPE,
         text=True,
         env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
+        preexec_fn=hear_ctrl_c,
     )
     assert child.stdout.readline() == "running\n"
     child.send_signal(signal.SIGINT)

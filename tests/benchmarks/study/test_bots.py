@@ -29,6 +29,7 @@ from benchmarks.study.errors import StudyError
 from benchmarks.study.games import make_game
 from benchmarks.study.store import database_path, open_readonly
 from benchmarks.study.timeline import timeline
+from tests.support.signals import hear_ctrl_c
 from tests.support.small_studies import small_study
 
 DOMAINS = ("overcooked", "tabletop")
@@ -118,7 +119,7 @@ def test_a_stopped_command_takes_its_server_along(study: Study) -> None:
     process = subprocess.Popen(
         [sys.executable, "-c", command, str(study.folder), "--participants", "500"],
         env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[3])}, stderr=subprocess.PIPE, text=True,
-        start_new_session=True,
+        start_new_session=True, preexec_fn=hear_ctrl_c,
     )  # fmt: skip
     path = database_path(study.folder, "debug")
 

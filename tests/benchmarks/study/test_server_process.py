@@ -19,6 +19,7 @@ from typing import Any
 import pytest
 
 from tests.benchmarks.study.small_studies import write_small_study
+from tests.support.signals import hear_ctrl_c
 
 ROOT = Path(__file__).parents[3]
 LONGEST = 120.0
@@ -30,7 +31,7 @@ def serve(folder: Path, *options: str) -> Iterator[tuple[subprocess.Popen[str], 
     command = [sys.executable, "-m", "benchmarks.cli.app", "study", "serve", str(folder), "--port", "0", *options]
     process = subprocess.Popen(
         command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, encoding="utf-8",
-        env=os.environ | {"PYTHONUNBUFFERED": "1"},
+        env=os.environ | {"PYTHONUNBUFFERED": "1"}, preexec_fn=hear_ctrl_c,
     )  # fmt: skip
     timer = threading.Timer(LONGEST, process.kill)
     timer.start()
