@@ -248,7 +248,7 @@ class StateSpace:
     # -- sequences -----------------------------------------------------------------------------------------------------
 
     def sample(self, rng: np.random.Generator) -> list[tuple[str, tuple[str, ...], str, tuple[str, ...]]]:
-        """``(place, valid goals, goal, places afterwards)`` of the person's steps in a uniformly random valid sequence."""
+        """``(place, valid goals, goal, places afterwards)`` of the person's steps in a random valid sequence."""
         completions, state, sequence = self.completions, self.initial, []
         for _ in range(self.length):
             steps = [step for step in self.steps(state) if completions[step[3][0]]]

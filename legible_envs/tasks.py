@@ -59,7 +59,8 @@ class TaskGraph:
 
     Raises:
         TaskError: Duplicate or unknown names, a cycle (named), overlapping groups, no valid sequence at all, no
-            subtask that the person can perform, or more than 128 subtasks, 131,072 ways to have done some of them, or a million steps between task states.
+            subtask that the person can perform, or more than 128 subtasks, 131,072 ways to have done some of them, or
+            a million steps between task states.
 
     Example:
         >>> task = TaskGraph([Subtask("first", ("red",)), Subtask("second", ("blue",), after=("first",))], start="home")
@@ -169,7 +170,8 @@ class TaskGraph:
         group_of = {member: i for i, members in enumerate(self.groups.values()) for member in members}
         alike: dict[object, list[Subtask]] = defaultdict(list)
         for s in self.subtasks:
-            alike[s.goals, s.then, frozenset(s.after), frozenset(followers[s.name]), group_of.get(s.name), s.agents].append(s)
+            waiting = frozenset(s.after), frozenset(followers[s.name])
+            alike[s.goals, s.then, waiting, group_of.get(s.name), s.agents].append(s)
         index = {s.name: i for i, members in enumerate(alike.values()) for s in members}
         return [
             SubtaskClass(
