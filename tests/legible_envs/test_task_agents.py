@@ -42,7 +42,7 @@ def team_tasks(draw) -> TaskGraph:
 
 
 @given(team_tasks())
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=120, deadline=None)
 def test_counts_stages_and_transitions_equal_brute_force(task):
     oracle = TaskOracle(task)
     stages, transitions = oracle.visits()
@@ -71,7 +71,7 @@ def test_a_sampled_person_makes_transitions_of_the_task_and_no_other(task, seed)
 
 def test_samples_are_as_frequent_as_weights_say():
     task = soup_task([("onion", "fish"), ("tomato",)], agents={"fish": "robot"})
-    rng, n = np.random.default_rng(4), 4000
+    rng, n = np.random.default_rng(4), 1500
     counts = Counter((t.start, t.goals, t.goal, t.then) for _ in range(n) for t in task.sample(rng))
     for t in task.transitions():
         sd = math.sqrt(n * t.weight) + 1
@@ -135,7 +135,7 @@ def test_who_can_do_what():
     assert [s.name for s in task.reserved_for("robot")] == ["soup 1: fish"]
     assert [s.name for s in task.reserved_for("human")] == ["soup 1: serve"]
     assert not any("fish" in pair for pair in task.legs())
-    with pytest.raises(TaskError, match="`agent` must be one of"):
+    with pytest.raises(TaskError, match="`agent` must be 'human' or 'robot', got 'dog'"):
         task.goals_of("dog")
 
 
@@ -210,7 +210,7 @@ def test_a_kitchen_is_scored_for_what_the_person_may_do():
 
 def test_only_what_the_person_does_must_be_in_their_reach():
     task = soup_task([("fish", "onion")], agents={"fish": "robot"})
-    person = reach_of(OvercookedLayout.from_rows(["XOXXXFX", "X1 XX2X", "XSDPXXX"]))
+    person = reach_of(OvercookedLayout.from_rows(["XOXXXFX", "X1 P 2X", "XSDXXXX"]))
     assert person.out_of_reach == ("fish",)
     person.check_task(task)
     assert OvercookedScorer(task).score_layout(person.layout)["out_of_reach"] == ["fish"]
