@@ -112,6 +112,7 @@ class StateSpace:
         self.max_open = max_open
         self.initial: State = ((0,) * len(self.classes), start)
         self.length = sum(cls.count for cls in self.classes)
+        self._endings = [cls.endings for cls in self.classes]
 
     @property
     def num_sequences(self) -> int:
@@ -144,10 +145,10 @@ class StateSpace:
         done, place = state
         steps: list[tuple[int, str | None, float, State]] = []
         for i in self.ready(done):
-            cls, following = self.classes[i], _with_one_more(done, i)
-            left = cls.count - done[i]
-            if cls.is_persons:
-                steps += [(i, goal, left / len(cls.goals), (following, there)) for goal, there in cls.endings]
+            endings, following = self._endings[i], _with_one_more(done, i)
+            left = self.classes[i].count - done[i]
+            if endings:
+                steps += [(i, goal, left / len(endings), (following, there)) for goal, there in endings]
             else:
                 steps.append((i, None, float(left), (following, place)))
         return steps
@@ -167,8 +168,8 @@ class StateSpace:
         layer = {done: self._standing(done, tuple(i for i, c in enumerate(self.classes) if not c.predecessors))}
         layer[done].places[start] = None
         found, steps = dict(layer), 0
-        places = [dict.fromkeys(place for _, place in cls.endings) for cls in self.classes]
-        num_steps = [len(cls.endings) or 1 for cls in self.classes]
+        places = [dict.fromkeys(place for _, place in endings) for endings in self._endings]
+        num_steps = [len(endings) or 1 for endings in self._endings]
         for _ in range(self.length):
             following: dict[tuple[int, ...], _Standing] = {}
             for standing in layer.values():
@@ -280,19 +281,20 @@ class StateSpace:
         return dict(weights)
 
     def _odds(self, done: tuple[int, ...]) -> _Odds:
-        completions, standing = self.completions, self._standings[done]
-        odds = _Odds((), [], [])
+        completions, standing, total = self.completions, self._standings[done], self.completions[done]
+        steps: list[tuple[int, str, float, State]] = []
+        robots: list[tuple[float, tuple[int, ...]]] = []
         for i, then in zip(standing.ready, standing.following, strict=True):
             if not completions[then]:
                 continue
-            cls = self.classes[i]
+            endings, left = self._endings[i], self.classes[i].count - done[i]
             # Python ints stay exact however long the task; only their quotient is a float.
-            share = completions[then] / completions[done]
-            if not cls.is_persons:
-                odds.robots.append(((cls.count - done[i]) * share, then))
-            for goal, place in cls.endings:
-                odds.steps.append((i, goal, (cls.count - done[i]) / len(cls.goals) * share, (then, place)))
-        return odds._replace(goals=tuple(sorted({step[1] for step in odds.steps})))
+            share = left / (len(endings) or 1) * (completions[then] / total)
+            for goal, place in endings:
+                steps.append((i, goal, share, (then, place)))
+            if not endings:
+                robots.append((share, then))
+        return _Odds(tuple(sorted({step[1] for step in steps})), steps, robots)
 
 
 def _steps_between(classes: Sequence[SubtaskClass]) -> int:

@@ -8,6 +8,7 @@ from typing import Final
 
 from legible_envs.errors import TaskError
 from legible_envs.overcooked.layout import INGREDIENTS
+from legible_envs.subtasks import names_in
 from legible_envs.support.validation import entries, shown
 from legible_envs.tasks import AGENTS, Subtask, TaskGraph
 
@@ -84,21 +85,19 @@ def soup_task(
             for kind, n in Counter(recipe).items()
         ]
         before = tuple(s.name for s in fetches)
-        last = {"after": before, "then": ("pot", "serving"), "agents": able.get("dish", AGENTS)}
-        serve = Subtask(f"soup {number}: serve", ("dish",), **last)
+        able_to_serve = able.get("dish", AGENTS)
+        serve = Subtask(f"soup {number}: serve", ("dish",), before, ("pot", "serving"), agents=able_to_serve)
         subtasks += [*fetches, serve]
         groups[f"soup {number}"] = (*before, serve.name)
     return TaskGraph(subtasks, start="serving", groups=groups, max_open=pots)
 
 
-def _who_fetches(
-    recipes: Sequence[Recipe], agents: Mapping[str, str | Sequence[str]] | None
-) -> Mapping[str, str | Sequence[str]]:
+def _who_fetches(recipes: Sequence[Recipe], agents: object) -> dict[str, tuple[str, ...]]:
     """The ``agents`` of :func:`soup_task`, all of something that is fetched."""
-    fetched = [*(kind for kind in INGREDIENTS if any(kind in recipe for recipe in recipes)), "dish"]
     if agents is not None and not isinstance(agents, Mapping):
         raise TaskError(f"`agents` must map what is fetched to who can fetch it, got {shown(agents)}")
+    fetched = [*(kind for kind in INGREDIENTS if any(kind in recipe for recipe in recipes)), "dish"]
     unknown = [kind for kind in agents or {} if kind not in fetched]
     if unknown:
         raise TaskError(f"`agents` names {shown(unknown[0])}, which is not fetched; expected some of {fetched}")
-    return agents or {}
+    return {kind: names_in(f"`agents` of {kind!r}", able) for kind, able in (agents or {}).items()}
