@@ -35,7 +35,7 @@ $(VENV)/.run-installed: $(LOCKED) pyproject.toml | $(BIN)/python
 $(VENV)/.test-installed: $(LOCKED) pyproject.toml | $(BIN)/python
 	@echo "Installing the test environment into $(VENV) (pinned versions) ..."
 	$(if $(TORCH),$(PIP) $(TORCH))
-	$(PIP) -c $(LOCKED) -e '.[dev,distributed,docs,minari,study$(if $(TORCH),$(comma)rl)]'
+	$(PIP) -c $(LOCKED) -e '.[dev,distributed,docs,minari,multiagent,study$(if $(TORCH),$(comma)rl)]'
 	$(PIP) -c $(LOCKED) --no-deps $(EXAMPLES:%=-e %)
 	@touch $@ $(VENV)/.run-installed
 
