@@ -144,12 +144,13 @@ class BehaviourCloning(GridPredictor):
         reached = layout.station_at(cells[-1])
         if reached is not None:
             return np.array([float(name == reached) for name in places])
-        at, before, taken = _steps(cells, layout.shape[1])
+        (row, col), width = cells[0], layout.shape[1]
+        at, before, taken = _steps(cells, width)
         logs = np.log(prior)
         for number, name in enumerate(places):
             table = self.step_log_probabilities(layout, name)
-            if (table[cells[0][0] * layout.shape[1] + cells[0][1], _NO_HEADING] == 0).all():
-                raise ValueError(f"the candidate {name!r} cannot be reached from row {cells[0][0]}, column {cells[0][1]}")
+            if not table[row * width + col, _NO_HEADING].any():  # no step leads there
+                raise ValueError(f"the candidate {name!r} cannot be reached from row {row}, column {col}")
             logs[number] += table[at, before, taken].sum()
         weights = np.exp(logs - logs.max())
         return np.asarray(weights / weights.sum(), dtype=np.float64)

@@ -49,7 +49,7 @@ FEATURES: Final[tuple[Feature, ...]] = (
 """Names of the features, in the order of weights."""
 assert len(FEATURES) == NUM_FEATURES
 
-RECORDED_WEIGHTS: Final = (1.05, 0.0, 1.08, -1.59, 0.36, 0.0, 0.0, 0.0)
+RECORDED_WEIGHTS: Final = (1.05, -0.66, 1.08, -1.59, 0.36, -0.11, -0.15, -1.23)
 """Weights of the features in the 2,406 trajectories of real people that
 :func:`legible_envs.datasets.overcooked_2019.recorded_trajectories` finds in four kitchens together."""
 
@@ -116,7 +116,7 @@ class _Choices:
 def fit_policy(
     trajectories: Iterable[Trajectory], *, l2: float = 1.0, features: Sequence[Feature] = FEATURES
 ) -> PolicyFit:
-    """Fit the weights of :class:`ClonedWalker` by maximum likelihood.
+    r"""Fit the weights of :class:`ClonedWalker` by maximum likelihood.
 
     Every step counts, from floor cell to floor cell and into the goal station; where people stand first, and how long,
     does not.
@@ -133,9 +133,9 @@ def fit_policy(
 
     Example:
         >>> from legible_envs.overcooked import OvercookedLayout
-        >>> kitchen = OvercookedLayout.from_ascii("XOXXX\\nX   X\\nXXXSX")
-        >>> trajectory = Trajectory([(1, 3), (1, 2), (1, 1), (0, 1)], goal="onion", candidates=("onion",), layout=kitchen)
-        >>> fit = fit_policy([trajectory] * 9)
+        >>> kitchen = OvercookedLayout.from_ascii("XOXXX\nX   X\nXXXSX")
+        >>> cells = [(1, 3), (1, 2), (1, 1), (0, 1)]
+        >>> fit = fit_policy([Trajectory(cells, goal="onion", candidates=("onion",), layout=kitchen)] * 9)
         >>> fit.weights["progress"] > 0, fit.num_steps
         (True, 27)
     """
@@ -196,7 +196,7 @@ def _choices(trajectories: Sequence[Trajectory], used: Sequence[int]) -> _Choice
 
 
 class ClonedWalker(Walker):
-    """A person who walks as people were seen to: each step is drawn from a policy that was learned from play.
+    r"""A person who walks as people were seen to: each step is drawn from a policy that was learned from play.
 
     Unlike :class:`~legible_envs.overcooked.humans.BoltzmannWalker`, this person keeps their direction and seldom turns
     back, as people do. :func:`fit_policy` learns the weights; see there and
@@ -214,7 +214,7 @@ class ClonedWalker(Walker):
     Example:
         >>> import numpy as np
         >>> from legible_envs.overcooked import OvercookedLayout
-        >>> kitchen = OvercookedLayout.from_ascii("XOXXTX\\nX    X\\nXXXXSX")
+        >>> kitchen = OvercookedLayout.from_ascii("XOXXTX\nX    X\nXXXXSX")
         >>> ClonedWalker({"progress": 9}).walk(kitchen, "serving", "onion", np.random.default_rng(0))
         [(1, 4), (1, 3), (1, 2), (1, 1), (0, 1)]
     """
