@@ -141,12 +141,15 @@ def make_policy(player: Player, env: Any, rng: np.random.Generator) -> Policy:
     """One participant's policy.
 
     Raises:
-        TypeError: The class does not take ``(env, rng)``, or makes something that cannot be called.
+        RuntimeError: A class that cannot be made with ``(env, rng)``.
+        TypeError: What it makes cannot be called.
     """
     try:
         policy = player.make(env, rng)
-    except TypeError as error:
-        raise TypeError(f"player {player.name!r} cannot be made with (env, rng): {error}") from error
+    except Exception as error:  # users' code may raise anything
+        raise RuntimeError(
+            f"player {player.name!r} cannot be made with (env, rng): {type(error).__name__}: {error}"
+        ) from error
     if not callable(policy):
         raise TypeError(f"player {player.name!r} must make a policy that can be called, got {shown(policy)}")
     return policy

@@ -49,13 +49,13 @@ def features(layout: OvercookedLayout, cell: Cell, before: Cell | None, goal: st
         found[after] = {
             "progress": least - cost,
             "far": least - cost if least > 3 else 0.0,
-            "straight": before is not None and (cell[0] - before[0], cell[1] - before[1]) == (after[0] - cell[0], after[1] - cell[1]),
+            "straight": before is not None and after == (2 * cell[0] - before[0], 2 * cell[1] - before[1]),
             "back": after == before,
             "beeline": nearer,
             "longer_side": nearer and (rows > cols if is_vertical else cols > rows),
             "arrive": after == station,
             "walls": 0.0 if after == station else 1 - sum(around) / 4,
-        }  # fmt: skip
+        }
     return found
 
 
@@ -166,7 +166,8 @@ def test_clones_are_values() -> None:
     factors = np.log([person.weights[0] / RECORDED_WEIGHTS[0] for person in drawn])
     assert abs(factors.mean()) < 4 * 0.35 / 20
     assert 0.28 < factors.std() < 0.42
-    assert all(person.weights / person.weights[0] == pytest.approx(np.array(RECORDED_WEIGHTS) / RECORDED_WEIGHTS[0]) for person in drawn)  # fmt: skip
+    shares = np.array(RECORDED_WEIGHTS) / RECORDED_WEIGHTS[0]
+    assert all(person.weights / person.weights[0] == pytest.approx(shares) for person in drawn)
 
 
 @pytest.mark.parametrize(
