@@ -95,7 +95,7 @@ def make_played_dataset(
         )
         with MinariWriter(Path(folder), info) as writer:
             for number, (episode, labels) in enumerate(_play(env, who, episodes, people, seed, condition), 1):
-                writer.add([episode], [labels])
+                writer.add(episode, labels)
                 if progress is not None:
                     progress(number, episodes)
         return writer.dataset

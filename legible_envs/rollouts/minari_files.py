@@ -105,7 +105,7 @@ def from_minari(
         replayer = Replayer(game, [episode.options.get("layout") for episode in episodes], _is_lossy(found))
         trajectories = []
         for episode in episodes:
-            trajectories += replayer.trajectories(episode, **{**episode.labels, **given})
+            trajectories += replayer.trajectories(episode, **given)
         return trajectories
     finally:
         if env is None:
@@ -172,19 +172,20 @@ def _episodes(dataset: Any) -> Iterator[RecordedEpisode]:
             observations=np.asarray(episode.observations),
             actions=np.asarray(episode.actions),
             rewards=np.asarray(episode.rewards, dtype=np.float64),
-            labels={} if labels is None else _labels(labels, episode.id),
+            labels=[{}] if labels is None else _labels(labels, episode.id),
         )
 
 
-def _labels(text: object, episode: object) -> dict[str, Any]:
-    """The arguments of ``trajectories`` that :func:`to_minari` kept."""
+def _labels(text: object, episode: object) -> list[dict[str, Any]]:
+    """The arguments of ``trajectories`` that were kept: those of one player, or a list with those of each."""
     try:
         labels = parse_json(text) if isinstance(text, str) else text
     except ValueError as error:
         raise ValueError(f"episode {episode}: its labels cannot be read: {error}") from error
-    if not isinstance(labels, dict):
-        raise ValueError(f"episode {episode}: its labels must be a mapping, got {shown(labels)}")
-    return labels
+    listed = labels if isinstance(labels, list) else [labels]
+    if not listed or not all(isinstance(entry, dict) for entry in listed):
+        raise ValueError(f"episode {episode}: its labels must be a mapping or a list of such, got {shown(labels)}")
+    return listed
 
 
 def _plain(options: Mapping[str, Any]) -> dict[str, Any]:

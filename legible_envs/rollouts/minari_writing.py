@@ -1,8 +1,8 @@
 """Writing Minari data sets into any folder, an episode at a time and all or nothing.
 
 Minari's own functions write into the one folder that ``MINARI_DATASETS_PATH`` names and take all episodes at once. Here
-the folder is an argument, the environment variable is neither read nor set, and only the episodes handed over together
-are kept in memory. What comes out is laid out as Minari expects it: with ``MINARI_DATASETS_PATH`` set to the folder,
+the folder is an argument, the environment variable is neither read nor set, and no more than one episode
+is kept in memory. What comes out is laid out as Minari expects it: with ``MINARI_DATASETS_PATH`` set to the folder,
 ``minari.load_dataset`` and ``minari list local`` find the data set by its id.
 """
 
@@ -13,7 +13,7 @@ import json
 import re
 import secrets
 import shutil
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -131,23 +131,19 @@ class MinariWriter:
         self._storage.update_metadata(about)
         return self
 
-    def add(self, episodes: Iterable[Episode], labels: Iterable[Mapping[str, Any]]) -> None:
-        """Write episodes.
+    def add(self, episode: Episode, labels: Mapping[str, Any] | Sequence[Mapping[str, Any]], **details: str) -> None:
+        """Write an episode.
 
         Args:
-            episodes: Each of one step at least.
-            labels: For each the arguments of the environment's ``trajectories`` with which :func:`.from_minari` gives
-                its trajectories, such as ``participant``.
+            episode: Of one step at least.
+            labels: The arguments of the environment's ``trajectories`` with which :func:`.from_minari` gives its
+                trajectories, such as ``participant``; a list has those of each player.
+            **details: Further metadata of the episode.
         """
-        listed = list(episodes)
-        numbers = range(self._count, self._count + len(listed))
-        self._storage.update_episodes([episode_buffer(n, each) for n, each in zip(numbers, listed, strict=True)])
-        about = [
-            {"participant": each.participant, "condition": each.condition, LABELS: json.dumps(dict(label))}
-            for each, label in zip(listed, labels, strict=True)
-        ]
-        self._storage.update_episode_metadata(about, numbers)
-        self._count += len(listed)
+        number, self._count = self._count, self._count + 1
+        self._storage.update_episodes([episode_buffer(number, episode)])
+        about = {"participant": episode.participant, "condition": episode.condition, LABELS: json.dumps(labels)}
+        self._storage.update_episode_metadata([{**details, **about}], [number])
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
