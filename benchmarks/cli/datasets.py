@@ -29,8 +29,8 @@ def datasets() -> None:
               help="Kitchens: scripted, boltzmann, planner, cloned or recorded. Tables: scripted or reach. Or a policy "
                    "of yours, called with (observation, info), or a class of one, made with (env, rng).")  # fmt: skip
 @click.option("--layout", "sources", type=LayoutSource(), metavar="LAYOUT", multiple=True,
-              help="A layout's file or -; repeatable. In kitchens also random, random:train and random:test. For "
-                   "recorded games the names of their kitchens. [default: the environment's own; all recorded]")  # fmt: skip
+              help="A layout's file or -; in kitchens repeatable, and also random, random:train, random:test. With "
+                   "recorded games: name of a kitchen. [default: the environment's own; all]")  # fmt: skip
 @click.option("--shape", nargs=2, type=click.IntRange(3, 64), metavar="ROWS COLS", help="Kitchens: their size.")
 @click.option("--task", metavar="NAME|FILE.yaml", help="Tables: what is built.")
 @click.option("--obs-type", type=click.Choice(["grid", "vector"]), help="Kitchens: observations. [default: grid]")
@@ -68,57 +68,73 @@ def make(
     recordings: Path | None,
     out: Path,
 ) -> None:
-    """Play episodes, or convert recorded games, and write them as a Minari data set.
+    """Make a Minari data set of played or recorded episodes.
 
     The same options make the same arrays. Read it with minari.load_dataset, where MINARI_DATASETS_PATH names the
     folder, or with minari.MinariDataset(PATH).
     """
     from benchmarks.console import plural, say, tell
-    from legible_envs.datasets.played import make_played_dataset
-    from legible_envs.datasets.recorded import make_recorded_dataset
 
+    _check_options(ctx, domain, player, sources)
     arguments = settings_from(assigned, "--argument")
     arguments |= {key: value for key, value in {"obs_type": obs_type, "task": task}.items() if value is not None}
-    _check_domain(ctx, domain, player)
-    shared: dict[str, Any] = {"author": author, "description": description, "dataset_id": dataset_id}
+    about: dict[str, Any] = {"dataset_id": dataset_id, "description": description}
+    about |= {"author": author} if author else {}
     with say().status("") as status:
 
         def progress(done: int, of: int) -> None:
-            status.update(f"{plural(done, 'episode')} of {of:,}")
+            status.update(f"{done:,} of {plural(of, 'episode')}")
 
+        about["progress"] = progress
         if player == _RECORDED:
-            found = make_recorded_dataset(
-                out, recordings=recordings, layouts=sources or None, games=episodes, progress=progress,
-                **shared, **arguments,
-            )  # fmt: skip
+            found = _convert(out, recordings, sources, episodes, about | arguments)
         else:
-            found = make_played_dataset(
-                out, domain, player=player, episodes=episodes or 100, participants=participants, seed=seed,
-                progress=progress, **shared, **_layouts(domain, sources, shape), **arguments,
-            )  # fmt: skip
-    tell(f"{found.id}: {plural(found.total_episodes, 'episode')}, {plural(found.total_steps, 'step')}")
-    tell(f"data set: {click.format_filename(found.storage.data_path.parent)}")
+            arguments |= _layouts(domain, sources, shape)
+            numbers: dict[str, Any] = {"episodes": episodes or 100, "participants": participants, "seed": seed}
+            found = _play(out, domain, player, numbers, about | arguments)
+    for dataset in found:
+        place = click.format_filename(dataset.storage.data_path.parent)
+        tell(
+            f"{dataset.id}: {plural(dataset.total_episodes, 'episode')}, {plural(dataset.total_steps, 'step')}, {place}"
+        )
 
 
-def _check_domain(ctx: click.Context, domain: str, player: str) -> None:
+def _play(out: Path, domain: str, player: str, numbers: dict[str, Any], arguments: dict[str, Any]) -> list[Any]:
+    from legible_envs.datasets.played import make_played_dataset
+
+    return [make_played_dataset(out, domain, player=player, **numbers, **arguments)]
+
+
+def _convert(
+    out: Path, recordings: Path | None, kitchens: tuple[str, ...], games: int | None, arguments: dict[str, Any]
+) -> list[Any]:
+    from legible_envs.datasets.overcooked_2019 import recorded_layouts
+    from legible_envs.datasets.recorded import make_recorded_dataset
+
+    names = kitchens or tuple(recorded_layouts(recordings))
+    return [make_recorded_dataset(out, name, recordings=recordings, games=games, **arguments) for name in names]
+
+
+def _check_options(ctx: click.Context, domain: str, player: str, sources: tuple[str, ...]) -> None:
     """Refuse options of the other domain, or of played episodes with recorded ones."""
     if player == _RECORDED:
         if domain != "overcooked":
-            raise click.UsageError("--player recorded: games were recorded in kitchens; leave out --env tabletop")
-        if given := given_options(ctx, list(_ONLY_PLAYED)):
+            raise click.UsageError("games were recorded in kitchens: --player recorded goes with --env overcooked")
+        if given := given_options(ctx, _ONLY_PLAYED):
             raise click.UsageError(f"{_ONLY_PLAYED[given[0]]} has no meaning for recorded games")
+        if given_options(ctx, ["dataset_id"]) and len(sources) != 1:
+            raise click.UsageError("each recorded kitchen makes a data set of its own; --name takes one --layout")
         return
     if given_options(ctx, ["recordings"]):
         raise click.UsageError("--from goes with --player recorded")
     other = {"shape": "--shape", "obs_type": "--obs-type"} if domain == "tabletop" else {"task": "--task"}
-    if given := given_options(ctx, list(other)):
-        raise click.UsageError(
-            f"{other[given[0]]} goes with --env {'overcooked' if domain == 'tabletop' else 'tabletop'}"
-        )
+    if given := given_options(ctx, other):
+        wanted = "overcooked" if domain == "tabletop" else "tabletop"
+        raise click.UsageError(f"{other[given[0]]} goes with --env {wanted}")
 
 
 def _layouts(domain: str, sources: tuple[str, ...], shape: tuple[int, int] | None) -> dict[str, Any]:
-    """The arguments of the environment that say in which layouts is played.
+    """The arguments of the environment that say which layouts are played on.
 
     Raises:
         click.UsageError: More layouts than the environment takes.
@@ -130,7 +146,7 @@ def _layouts(domain: str, sources: tuple[str, ...], shape: tuple[int, int] | Non
         return arguments
     drawn = [source for source in sources if source.partition(":")[0] == "random"] if domain == "overcooked" else []
     if len(sources) > 1 and (drawn or domain == "tabletop"):
-        what = "tables: one layout" if domain == "tabletop" else f"{drawn[0]} is a distribution of its own"
+        what = f"{drawn[0]} draws its own kitchens" if drawn else "a data set of tables has one"
         raise click.UsageError(f"--layout is given {len(sources)} times; {what}")
     if drawn:
         return {**arguments, "layouts": drawn[0]}
