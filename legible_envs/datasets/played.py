@@ -24,7 +24,7 @@ from legible_envs.rollouts.recording import Episode, RecordTrajectories
 from legible_envs.support.specs import plain
 from legible_envs.support.validation import choice, integer
 
-__all__ = ["Progress", "make_played_dataset", "requirements"]
+__all__ = ["Progress", "make_environment", "make_played_dataset", "requirements"]
 
 Progress = Callable[[int, int], None]
 """Told (episodes done, of how many)."""
@@ -79,7 +79,7 @@ def make_played_dataset(
     seed = integer("seed", seed, 0)
     people = (episodes if who.differs else 1) if participants is None else participants
     people, _ = check_participants(integer("participants", people, 1), 1)
-    env = gym.make(ENVIRONMENTS[domain], **plain(arguments))
+    env = make_environment(ENVIRONMENTS[domain], **arguments)
     try:
         assert env.spec is not None
         info = DatasetInfo(
@@ -101,6 +101,18 @@ def make_played_dataset(
         return writer.dataset
     finally:
         env.close()
+
+
+def make_environment(name: str, **arguments: Any) -> gym.Env[Any, Any]:
+    """An environment of this package, whose spec is JSON.
+
+    Raises:
+        ValueError: Bad arguments, or one that the environment does not have.
+    """
+    try:
+        return gym.make(name, **plain(arguments))
+    except TypeError as error:
+        raise ValueError(f"{name} cannot be made with {sorted(arguments)}: {error}") from error
 
 
 def requirements() -> list[str]:

@@ -20,11 +20,10 @@ import numpy as np
 
 from legible_envs.datasets.overcooked_2019 import load_recorded_games, recorded_layouts
 from legible_envs.datasets.overcooked_ai.games import RecordedGame, RecordingsError
-from legible_envs.datasets.played import Progress, requirements
+from legible_envs.datasets.played import Progress, make_environment, requirements
 from legible_envs.overcooked.game.vectors import AT_PLAYERS
 from legible_envs.rollouts.minari_writing import DatasetInfo, MinariWriter
 from legible_envs.rollouts.recording import Episode, RecordTrajectories
-from legible_envs.support.specs import plain
 from legible_envs.support.validation import integer
 
 __all__ = ["AUTHORS", "make_recorded_dataset"]
@@ -82,8 +81,8 @@ def make_recorded_dataset(
     if games is not None:
         found = found[: integer("games", games, 1)]
     longest = max(game.num_ticks for game in found)
-    settings = {"max_episode_steps": longest, **plain(arguments)}
-    env = gym.make(
+    settings = {"max_episode_steps": longest, **arguments}
+    env = make_environment(
         "LegibleOvercooked-v0",
         layout=known[layout_name].to_ascii(),
         num_players=2,

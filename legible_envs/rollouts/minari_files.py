@@ -182,7 +182,7 @@ def _labels(text: object, episode: object) -> list[dict[str, Any]]:
         labels = parse_json(text) if isinstance(text, str) else text
     except ValueError as error:
         raise ValueError(f"episode {episode}: its labels cannot be read: {error}") from error
-    listed = labels if isinstance(labels, list) else [labels]
+    listed: list[Any] = labels if isinstance(labels, list) else [labels]
     if not listed or not all(isinstance(entry, dict) for entry in listed):
         raise ValueError(f"episode {episode}: its labels must be a mapping or a list of such, got {shown(labels)}")
     return listed
