@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +25,7 @@ from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.rollouts.trajectory import Trajectory
 from legible_envs.support.validation import choice, real
 from predictors.grid.base import GridPredictor, check_complete, check_trajectory
+from predictors.grid.candidates import within_reach
 from predictors.grid.priors import PRIORS, GoalPrior, Prior
 
 __all__ = ["BehaviourCloning"]
@@ -33,6 +34,8 @@ Floats = npt.NDArray[np.float64]
 
 _MOST_TABLES = 1024
 _NO_HEADING = 4
+_GREATEST_TRUST = 3.0
+_TINY = 1e-300
 _DIRECTIONS = {step: direction for direction, step in enumerate(NEIGHBOURS)}
 
 
@@ -53,11 +56,15 @@ class BehaviourCloning(GridPredictor):
         l2: Strength of the pull of all weights toward 0, above 0.
         features: Names of :data:`legible_envs.overcooked.humans.cloning.FEATURES` to use; all by default.
         prior: ``"uniform"`` over candidates, or ``"empirical"``: as often as each was chosen in ``fit``.
+        trust: Exponent of the likelihood. 1: Bayes' rule. Smaller: steps of people who are not quite as the policy says
+            are not taken for as many independent pieces of evidence (a power posterior). ``"fit"``: what makes the
+            goals in ``fit`` most likely, given every prefix there.
 
     Attributes:
         classes_: ``(K,)`` names of all goals and candidates seen in ``fit``, sorted.
         policy_: The :class:`~legible_envs.overcooked.humans.PolicyFit`: weights by feature, their standard errors and
             the log-likelihood.
+        trust_: The exponent used.
 
     Example:
         >>> from legible_envs.overcooked import OvercookedLayout
@@ -71,11 +78,20 @@ class BehaviourCloning(GridPredictor):
     """
 
     policy_: PolicyFit
+    trust_: float
 
-    def __init__(self, l2: float = 1.0, *, features: Sequence[Feature] = FEATURES, prior: Prior = "uniform") -> None:
+    def __init__(
+        self,
+        l2: float = 1.0,
+        *,
+        features: Sequence[Feature] = FEATURES,
+        prior: Prior = "uniform",
+        trust: float | Literal["fit"] = 1.0,
+    ) -> None:
         self.l2 = l2
         self.features = features
         self.prior = prior
+        self.trust = trust
 
     def fit(self, X: Sequence[Trajectory], y: object = None) -> Self:
         """Learn the weights from complete trajectories.
@@ -95,12 +111,39 @@ class BehaviourCloning(GridPredictor):
         self._prior = GoalPrior(self.prior, trajectories, self.classes_)
         self._tables: dict[tuple[OvercookedLayout, str], Floats] = {}
         self.policy_ = fit_policy(trajectories, l2=self.l2, features=self.features)
+        self.trust_ = self._fit_trust(trajectories) if self.trust == "fit" else float(self.trust)
         return self
 
     def _check_parameters(self) -> None:
         real("l2", self.l2, 0, closed="neither")
         check_features(self.features)
         choice("prior", self.prior, PRIORS)
+        if self.trust != "fit":
+            real("trust", self.trust, 0, _GREATEST_TRUST, also="'fit'")
+
+    def _fit_trust(self, trajectories: Sequence[Trajectory]) -> float:
+        """The exponent that makes the goals most likely, given all prefixes of two cells or more.
+
+        All prefixes weigh alike: then people who are just as the policy says have an exponent of 1. The loss is convex.
+        """
+        from scipy.optimize import minimize_scalar
+
+        parts = []
+        for trajectory in map(within_reach, trajectories):
+            evidence = self._evidence(trajectory.first(trajectory.num_states - 1)).cumsum(axis=1)
+            if evidence.size:
+                parts.append((np.log(self._prior.of(trajectory.candidates)), evidence, _column(trajectory)))
+
+        def loss(trust: float) -> float:
+            total = 0.0
+            for logs, evidence, goal in parts:
+                beliefs = _normalised(logs[:, None] + trust * evidence)
+                total -= float(np.log(np.maximum(beliefs[goal], _TINY)).sum())
+            return total
+
+        if not parts:
+            return 1.0
+        return float(minimize_scalar(loss, bounds=(0.0, _GREATEST_TRUST), method="bounded").x)
 
     def walker(self, **arguments: Any) -> ClonedWalker:
         """A simulated participant who walks as the people in ``fit`` did.
@@ -144,16 +187,18 @@ class BehaviourCloning(GridPredictor):
         reached = layout.station_at(cells[-1])
         if reached is not None:
             return np.array([float(name == reached) for name in places])
-        (row, col), width = cells[0], layout.shape[1]
-        at, before, taken = _steps(cells, width)
-        logs = np.log(prior)
-        for number, name in enumerate(places):
-            table = self.step_log_probabilities(layout, name)
-            if not table[row * width + col, _NO_HEADING].any():  # no step leads there
+        for name in places:
+            row, col = cells[0]
+            if not self.step_log_probabilities(layout, name)[row * layout.shape[1] + col, _NO_HEADING].any():
                 raise ValueError(f"the candidate {name!r} cannot be reached from row {row}, column {col}")
-            logs[number] += table[at, before, taken].sum()
-        weights = np.exp(logs - logs.max())
-        return np.asarray(weights / weights.sum(), dtype=np.float64)
+        return _normalised(np.log(prior) + self.trust_ * self._evidence(trajectory).sum(axis=1))
+
+    def _evidence(self, trajectory: Trajectory) -> Floats:
+        """``(K, T - 1)`` log-probability of each step between floor cells, for each candidate."""
+        layout = trajectory.layout
+        assert isinstance(layout, OvercookedLayout)
+        steps = _steps([(row, col) for row, col in trajectory.states.tolist()], layout.shape[1])
+        return np.array([self.step_log_probabilities(layout, name)[steps] for name in trajectory.candidates])
 
     def __getstate__(self) -> dict[str, Any]:
         """Without the tables, which are computed again on demand."""
@@ -169,6 +214,17 @@ def _station(layout: OvercookedLayout, name: str) -> Cell:
             f"the candidate {name!r} is no station of the layout, which has {list(layout.stations)}", rule="station"
         )
     return layout.stations[name]
+
+
+def _column(trajectory: Trajectory) -> int:
+    """Number of the goal among the candidates."""
+    return trajectory.candidates.index(trajectory.goal or "")
+
+
+def _normalised(logs: Floats) -> Floats:
+    """Probabilities from logarithms up to a constant, along the first axis."""
+    odds = np.exp(logs - logs.max(axis=0))
+    return np.asarray(odds / odds.sum(axis=0), dtype=np.float64)
 
 
 def _steps(cells: Sequence[Cell], width: int) -> tuple[list[int], list[int], list[int]]:

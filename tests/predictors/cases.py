@@ -146,7 +146,7 @@ KITCHEN_CASES = [
     Case(BayesianGoalPredictor(costs="soft", cell_costs=MaxEntIRL(l2=2.0)), "kitchen"),
     Case(BayesianGoalPredictor(cell_costs=np.arange(25.0).reshape(5, 5)), "kitchen"),
     Case(MaxEntIRL(prior="empirical"), "kitchen", uniform=False),
-    Case(BehaviourCloning(features=("progress", "back"), prior="empirical"), "kitchen", uniform=False),
+    Case(BehaviourCloning(features=("progress", "back"), prior="empirical", trust="fit"), "kitchen", uniform=False),
     Case(GridNeighbours(k=3), "kitchen", uniform=False, blind=False),
 ]
 """Predictors that need the layout of a kitchen."""

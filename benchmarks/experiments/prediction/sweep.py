@@ -39,7 +39,7 @@ PREDICTORS: Final = (
     PredictorSetting("MaxEnt IRL", "maxent-irl"),
     PredictorSetting("MaxEnt IRL with prior", "maxent-irl", {"prior": "empirical"}),
     PredictorSetting("behaviour cloning", "behaviour-cloning"),
-    PredictorSetting("behaviour cloning with prior", "behaviour-cloning", {"prior": "empirical"}),
+    PredictorSetting("behaviour cloning with prior", "behaviour-cloning", {"prior": "empirical", "trust": "fit"}),
     PredictorSetting("n-gram", "grid-ngram"),
     PredictorSetting("k-NN", "grid-knn"),
     PredictorSetting("logistic", "grid-logistic"),
