@@ -8,6 +8,7 @@ The same arguments make the same arrays, byte for byte. The environment can be m
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -107,12 +108,20 @@ def make_environment(name: str, **arguments: Any) -> gym.Env[Any, Any]:
     """An environment of this package, whose spec is JSON.
 
     Raises:
-        ValueError: Bad arguments, or one that the environment does not have.
+        ValueError: Bad arguments, one that the environment does not have, or one that JSON cannot hold, so that the
+            environment could not be made again from the data set.
     """
     try:
-        return gym.make(name, **plain(arguments))
+        env = gym.make(name, **plain(arguments))
     except TypeError as error:
         raise ValueError(f"{name} cannot be made with {sorted(arguments)}: {error}") from error
+    assert env.spec is not None
+    try:
+        json.dumps(env.spec.kwargs)
+    except (TypeError, ValueError) as error:
+        env.close()
+        raise ValueError(f"the arguments of {name} must be data that JSON can hold: {error}") from error
+    return env
 
 
 def requirements() -> list[str]:

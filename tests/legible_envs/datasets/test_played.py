@@ -55,6 +55,13 @@ class Broken(Restless):
         return 0 if self.steps < 4 else float("nan")
 
 
+class Endless:
+    """A distribution of kitchens that is no plain data."""
+
+    def sample(self, rng: np.random.Generator) -> OvercookedLayout:
+        return OvercookedLayout.from_ascii(KITCHEN)
+
+
 def arrays(dataset: Any) -> list[bytes]:
     """Every array of every episode, byte for byte, with its type and shape."""
     names = ("observations", "actions", "rewards", "terminations", "truncations")
@@ -169,6 +176,8 @@ def test_nothing_is_left_of_what_failed(tmp_path: Path) -> None:
         ({"dataset_id": "../x-v0"}, ValueError, "a data set is called like"),
         ({"dataset_id": "x"}, ValueError, "a data set is called like"),
         ({"layout": "XX"}, ValueError, "both sides"),
+        ({"speed": 1}, ValueError, r"LegibleOvercooked-v0 cannot be made with \['speed'\]"),
+        ({"layouts": Endless()}, ValueError, "must be data that JSON can hold"),
     ],
 )
 def test_what_is_refused(tmp_path: Path, arguments: dict[str, Any], error: type[Exception], message: str) -> None:
