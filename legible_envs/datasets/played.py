@@ -62,7 +62,8 @@ def make_played_dataset(
         description: In sentences; by default what is known.
         condition: Of all trajectories.
         progress: Told (episodes done, of how many) after each.
-        **arguments: Of ``gymnasium.make``, such as ``layout``, ``obs_type`` or ``max_episode_steps``.
+        **arguments: Of ``gymnasium.make``, such as ``layout``, ``obs_type`` or ``max_episode_steps``. With
+            ``num_players=2`` a policy gives joint actions, and observations are of both.
 
     Returns:
         The ``minari.MinariDataset``.
@@ -136,7 +137,7 @@ def _short(name: str) -> str:
 
 def _play(
     env: Any, player: Player, episodes: int, participants: int, seed: int, condition: str
-) -> Iterator[tuple[Episode, dict[str, Any]]]:
+) -> Iterator[tuple[Episode, dict[str, Any] | list[dict[str, Any]]]]:
     """Episodes and the labels of their trajectories, one after the other."""
     of_env, of_people = np.random.SeedSequence(seed).spawn(2)
     seeds = np.random.default_rng(of_env).integers(0, _GREATEST_SEED, size=episodes, endpoint=True).tolist()
@@ -151,7 +152,15 @@ def _play(
             policies[who] = make_policy(player, env, streams[who])
         _run(recorder, policies[who], player.name, number, first)
         (episode,) = recorder.episodes
-        yield episode, recorder.labels(episode)
+        yield episode, _labels(env, recorder.labels(episode))
+
+
+def _labels(env: Any, labels: dict[str, Any]) -> dict[str, Any] | list[dict[str, Any]]:
+    """Of the one player, or of each of several, who are numbered after the participant's name."""
+    cooks = getattr(env.unwrapped, "num_players", 1)
+    if cooks == 1:
+        return labels
+    return [{**labels, "player": cook, "participant": f"{labels['participant']}/{cook}"} for cook in range(cooks)]
 
 
 def _run(env: RecordTrajectories, policy: Policy, name: str, number: int, first: tuple[Any, dict[str, Any]]) -> None:

@@ -45,6 +45,13 @@ class Restless:
         return int(self.rng.choice(np.flatnonzero(info["action_mask"])))
 
 
+class Pair(Restless):
+    """A joint policy of all cooks."""
+
+    def __call__(self, observation: np.ndarray, info: dict[str, Any]) -> Any:
+        return [int(self.rng.choice(np.flatnonzero(mask))) for mask in info["action_mask"]]
+
+
 class Broken(Restless):
     """Gives no action in its fourth step."""
 
@@ -145,6 +152,22 @@ def test_policies_of_users_are_players(tmp_path: Path) -> None:
         tmp_path, "tabletop", player=f"{HERE}:drift", episodes=1, max_episode_steps=5, dataset_id="c-v0"
     )
     assert of_one.total_steps == 5
+
+
+def test_cooks_of_one_kitchen_have_trajectories_of_their_own(tmp_path: Path) -> None:
+    made = make_played_dataset(
+        tmp_path,
+        player=Pair,
+        episodes=2,
+        num_players=2,
+        layout=KITCHEN,
+        max_episode_steps=1500,
+    )
+    assert made.observation_space.shape == (2, 5, 5, 30)
+    assert made[0].actions.shape[1:] == (2,)
+    found = from_minari(made, candidate_set="all")
+    name = f"{HERE}:Pair/0"
+    assert {trajectory.participant for trajectory in found} == {f"{name}/0", f"{name}/1"}
 
 
 def test_nothing_is_left_of_what_failed(tmp_path: Path) -> None:
