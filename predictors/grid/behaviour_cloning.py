@@ -187,8 +187,8 @@ class BehaviourCloning(GridPredictor):
         reached = layout.station_at(cells[-1])
         if reached is not None:
             return np.array([float(name == reached) for name in places])
+        row, col = cells[0]
         for name in places:
-            row, col = cells[0]
             if not self.step_log_probabilities(layout, name)[row * layout.shape[1] + col, _NO_HEADING].any():
                 raise ValueError(f"the candidate {name!r} cannot be reached from row {row}, column {col}")
         return _normalised(np.log(prior) + self.trust_ * self._evidence(trajectory).sum(axis=1))

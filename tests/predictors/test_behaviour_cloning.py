@@ -136,6 +136,18 @@ def test_a_step_that_is_none_tells_nothing_and_a_station_everything() -> None:
     assert predictor.predict_proba([arrived])[0].tolist() == [0.0, 1.0, 0.0]
 
 
+def test_steps_that_nobody_takes_are_unlikely_and_not_impossible() -> None:
+    """Learned from flawless people, hardly pulled to 0: a detour has odds that no float can hold."""
+    flawless = BoltzmannWalker(50.0).sample(WIDE, "serving", ("onion", "tomato"), 40, np.random.default_rng(0))
+    predictor = BehaviourCloning(l2=1e-12).fit(flawless)
+    predictor.policy_.weights["progress"] = 1000.0
+    cells = [(3, 4), (3, 3), (3, 4), (3, 5), (3, 4), (2, 4)]
+    asked = Trajectory(cells, start="serving", candidates=("onion", "tomato"), layout=WIDE, complete=False)
+    (row,) = predictor.predict_proba([asked])
+    assert np.isfinite(row).all()
+    assert row.sum() == pytest.approx(1)
+
+
 def test_the_walker_walks_as_was_learned() -> None:
     predictor = BehaviourCloning().fit(people())
     walker = predictor.walker(idle=0.3)

@@ -88,17 +88,18 @@ def policy_table(field: GoalField, params: Floats, table: Floats) -> None:
         table: ``[n, 5, 4]`` output, by cell, direction of the step before (4 for none) and direction: ``-inf`` for
             steps that are no options; 0 at cells without any.
     """
-    weights = np.empty(4)
+    features, scores = np.empty((4, NUM_FEATURES)), np.empty(4)
     table[:] = 0.0
     for cell in range(len(field.floor)):
         if not field.floor[cell] or field.cost_to_go[cell] == np.inf:
             continue
         for before in range(5):
-            cloned_weights(cell, before if before < 4 else -1, field, params, weights)
-            total = weights.sum()
+            # In logarithms throughout: a step that is hardly ever taken is unlikely, never impossible.
+            option_features(cell, before if before < 4 else -1, field, features, scores)
             for direction in range(4):
-                probable = weights[direction] / total
-                table[cell, before, direction] = np.log(probable) if probable > 0.0 else -np.inf
+                scores[direction] = (features[direction] * params).sum() if scores[direction] > 0.0 else -np.inf
+            greatest = scores.max()
+            table[cell, before] = scores - greatest - np.log(np.exp(scores - greatest).sum())
 
 
 @kernel
