@@ -26,14 +26,15 @@ def made(out: Path, *arguments: object) -> Any:
     return minari.MinariDataset(out / name / "data")
 
 
-def test_kitchens_of_files(tmp_path: Path) -> None:
+def test_kitchens_of_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "elsewhere"))
     for name, drawing in (("a.txt", KITCHEN), ("b.txt", OTHER)):
         (tmp_path / name).write_text(drawing, encoding="utf-8")
-    known = dict(os.environ)
     of_one = made(tmp_path / "out", "--player", "boltzmann", "--layout", tmp_path / "a.txt", "--episodes", 3,
                   "--participants", 2, "--seed", 7, "--author", "Ada", "--author", "Grace",
                   "--description", "What for.", "--name", "mine/one-v0")  # fmt: skip
-    assert dict(os.environ) == known
+    assert os.environ["MINARI_DATASETS_PATH"] == str(tmp_path / "elsewhere")
+    assert not (tmp_path / "elsewhere").exists()
     assert of_one.id == "mine/one-v0"
     assert of_one.recover_environment().unwrapped.layout.to_ascii() == KITCHEN.strip()
     about = of_one.storage.metadata
