@@ -20,6 +20,10 @@ KEEP: Final = 0
 MOST_VALUES: Final = 1024
 """A gene of whole numbers with more values than this is edited in levels, like one of real numbers."""
 
+_SET: Final = 1
+_TOGGLE: Final = 2
+_SWAP: Final = 3
+
 _BATCH: Final = 2**23
 """Genes of candidates that are checked in one call: 8 MB of small integers."""
 
@@ -80,9 +84,11 @@ class Edits:
         self.partners = np.array([row[1] for row in rows], dtype=np.int64)
         self.values = np.array([row[2] for row in rows], dtype=np.float64)
         self.size = len(rows)
-        self._swaps = np.flatnonzero(self.partners >= 0)
-        self._sets = np.flatnonzero(~np.isnan(self.values))
-        self._toggles = np.flatnonzero((self.genes >= 0) & (self.partners < 0) & np.isnan(self.values))
+        self._kinds = np.where(self.partners >= 0, _SWAP, np.where(np.isnan(self.values), _TOGGLE, _SET))
+        self._kinds[KEEP] = KEEP
+        self._sets, self._toggles, self._swaps = (np.flatnonzero(self._kinds == kind) for kind in (_SET, _TOGGLE, _SWAP))
+        # A gene of two values has the other one when it has their sum less the one it has.
+        self._ends = (self._lower + self._upper).astype(self._dtype)
 
     def _choices(self, gene: int, levels: int) -> list[float]:
         """The values that a gene can be set to."""
@@ -105,16 +111,16 @@ class Edits:
 
     def apply(self, genomes: Genomes, actions: npt.NDArray[np.int64]) -> Genomes:
         """``(n, d)`` what ``(n,)`` edits make of ``(n, d)`` genomes, valid or not; one edit for each."""
-        edited = np.array(genomes, dtype=self._dtype)
-        kind = np.select([self.partners[actions] >= 0, ~np.isnan(self.values[actions]), actions != KEEP], [2, 1, 3], 0)
-        rows = np.flatnonzero(kind == 1)
-        edited[rows, self.genes[actions[rows]]] = self.values[actions[rows]]
-        rows = np.flatnonzero(kind == 3)
-        genes = self.genes[actions[rows]]
-        edited[rows, genes] = self._lower[genes] + self._upper[genes] - edited[rows, genes]
-        rows = np.flatnonzero(kind == 2)
-        first, second = self.genes[actions[rows]], self.partners[actions[rows]]
-        edited[rows, first], edited[rows, second] = genomes[rows, second], genomes[rows, first]
+        actions = np.asarray(actions)
+        edited, genes, partners = np.array(genomes, dtype=self._dtype), self.genes[actions], self.partners[actions]
+        kinds = self._kinds[actions]
+        rows = np.flatnonzero(kinds == _SET)
+        edited[rows, genes[rows]] = self.values[actions[rows]]
+        rows = np.flatnonzero(kinds == _TOGGLE)
+        edited[rows, genes[rows]] = self._ends[genes[rows]] - edited[rows, genes[rows]]
+        rows = np.flatnonzero(kinds == _SWAP)
+        edited[rows, genes[rows]] = genomes[rows, partners[rows]]
+        edited[rows, partners[rows]] = genomes[rows, genes[rows]]
         return edited
 
     def candidates(self, genomes: Genomes) -> Genomes:
@@ -123,8 +129,7 @@ class Edits:
         edited = np.repeat(genomes[:, None], self.size, axis=1)
         edited[:, self._sets, self.genes[self._sets]] = self.values[self._sets]
         genes = self.genes[self._toggles]
-        ends = (self._lower + self._upper)[genes].astype(self._dtype)
-        edited[:, self._toggles, genes] = ends - genomes[:, genes]
+        edited[:, self._toggles, genes] = self._ends[genes] - genomes[:, genes]
         first, second = self.genes[self._swaps], self.partners[self._swaps]
         edited[:, self._swaps, first] = genomes[:, second]
         edited[:, self._swaps, second] = genomes[:, first]
