@@ -132,10 +132,13 @@ class DesignProblem:
         raise self._nowhere(START_TRIES)
 
     def _nowhere(self, tried: int) -> LayoutError:
-        cap = "" if self.max_distance is None else f" (max_distance={self.max_distance:g})"
         return LayoutError(
-            f"none of {tried:,} random layouts has a score under objective {self.objective_name!r}{cap}", rule="objective"
+            f"none of {tried:,} random layouts has a score under objective {self.objective_name!r}{self._capped()}",
+            rule="objective",
         )
+
+    def _capped(self) -> str:
+        return "" if self.max_distance is None else f" with max_distance={self.max_distance:g}"
 
     # -- layouts of users ----------------------------------------------------------------------------------------------
 
@@ -151,8 +154,8 @@ class DesignProblem:
         genome = self._encoded(layout)
         if np.isnan(self.scores(genome[None])[0]):
             raise LayoutError(
-                f"the layout has no score under objective {self.objective_name!r}"
-                + ("" if self.max_distance is None else f" with max_distance={self.max_distance:g}"),
+                f"the layout has no score under objective {self.objective_name!r}{self._capped()}; its distance is "
+                f"{self.workspace.distance(genome):g}",
                 rule="objective",
             )
         return genome

@@ -27,7 +27,7 @@ class PolicyGradientEmitter(WorkspaceEmitter):
 
     ``designs`` layouts, drawn from the archive, are edited side by side: at every ``ask`` a neural policy picks one
     valid edit for each (:class:`~legible_envs.design_game.edits.Edits`; masks come from the workspace's ``valid``, no
-    layout is scored for them), and the edited layouts are what is proposed. ``tell`` turns scores into rewards, the
+    layout is scored for them) by comparing the layouts that the edits lead to, and these are what is proposed. ``tell`` turns scores into rewards, the
     change of the objective. After ``horizon`` edits the policy takes some gradient steps on the clipped surrogate of
     Schulman et al. (*Proximal policy optimization algorithms*, 2017) with generalised advantages, and other layouts are
     drawn. So every evaluation is a layout that the policy went to, and the archive, budget and checkpoints are those of
@@ -69,7 +69,7 @@ class PolicyGradientEmitter(WorkspaceEmitter):
         designs: int = 32,
         horizon: int = 16,
         levels: int = 15,
-        hidden: int = 128,
+        hidden: int = 64,
         learning_rate: float = 1e-3,
         epochs: int = 4,
         minibatch: int = 128,
@@ -120,7 +120,7 @@ class PolicyGradientEmitter(WorkspaceEmitter):
             ) from error
         known = ("hidden", "learning_rate", "epochs", "minibatch", "clip", "entropy")
         settings = {name: self._settings[name] for name in known}
-        return Learner(self._features.size + 1, self._edits.size, self._rng, **settings)
+        return Learner(self._features.size + 1, self._rng, **settings)
 
     @property
     def settings(self) -> dict[str, float]:
@@ -134,13 +134,16 @@ class PolicyGradientEmitter(WorkspaceEmitter):
             return self._workspace.sample(self._initial, self._rng)
         if not self._episode:
             self._genomes, self._scores = draw_elites(self.archive, len(self._scores), self._rng)
-        observed, masks = self._observe(), self._masks()
-        logits, values = self._learner.evaluate(observed, masks)
-        # The largest of logits with Gumbel noise is a draw from their softmax.
-        actions = np.argmax(logits + self._rng.gumbel(size=logits.shape), axis=1)
-        chosen = np.take_along_axis(logits, actions[:, None], axis=1)[:, 0]
-        row = {"observed": observed, "masks": masks, "actions": actions, "chosen": chosen, "values": values}
-        self._episode.append(row)
+        masks = self._masks()
+        left = 1.0 - len(self._episode) / self._settings["horizon"]
+        observed = self._observed(self._genomes, left)
+        ahead = self._observed(self._edits.candidates(self._genomes)[masks], left)
+        logs, values = self._learner.evaluate(observed, masks, ahead)
+        # The largest of log-probabilities with Gumbel noise is a draw from them.
+        actions = np.argmax(logs + self._rng.gumbel(size=logs.shape), axis=1)
+        chosen = np.take_along_axis(logs, actions[:, None], axis=1)[:, 0]
+        row = {"observed": observed, "masks": masks, "ahead": ahead}
+        self._episode.append(row | {"actions": actions, "chosen": chosen, "values": values})
         return self._edits.apply(self._genomes, actions)
 
     def tell(
@@ -163,10 +166,10 @@ class PolicyGradientEmitter(WorkspaceEmitter):
             self._learn()
             self._episode = []
 
-    def _observe(self) -> npt.NDArray[np.float32]:
-        """``(designs, n)`` the layouts, and the share of edits that is left."""
-        left = np.full((len(self._genomes), 1), 1.0 - len(self._episode) / self._settings["horizon"], dtype=np.float32)
-        return np.concatenate([self._features(self._genomes), left], axis=1)
+    def _observed(self, genomes: npt.NDArray[Any], left: float) -> npt.NDArray[np.float32]:
+        """``(n, inputs)`` the layouts, and the share of edits that is left."""
+        share = np.full((len(genomes), 1), left, dtype=np.float32)
+        return np.concatenate([self._features(genomes), share], axis=1)
 
     def _masks(self) -> npt.NDArray[np.bool_]:
         """``(designs, A)`` valid edits; to keep the layout would score it again, so only where there is no other."""
@@ -176,16 +179,17 @@ class PolicyGradientEmitter(WorkspaceEmitter):
 
     def _learn(self) -> None:
         """Update the policy with the episodes of all designs."""
-        steps = {name: np.stack([row[name] for row in self._episode]) for name in self._episode[0]}
+        rewards, values = (np.stack([row[name] for row in self._episode]) for name in ("rewards", "values"))
         if self._unit is None:
-            changes = np.abs(steps["rewards"][steps["rewards"] != 0])
+            changes = np.abs(rewards[rewards != 0])
             self._unit = float(np.median(changes)) if changes.size else None
-        rewards = steps["rewards"] / (self._unit or 1.0)
-        advantages = _advantages(rewards, steps["values"], self._settings["discount"], self._settings["trace"])
-        flat = {name: values.reshape(-1, *values.shape[2:]) for name, values in steps.items()}
-        returns = (advantages + steps["values"]).ravel()
-        batch = {name: flat[name] for name in ("observed", "masks", "actions", "chosen")}
-        self._learner.update(batch | {"advantages": advantages.ravel(), "returns": returns}, self._rng)
+        advantages = _advantages(
+            rewards / (self._unit or 1.0), values, self._settings["discount"], self._settings["trace"]
+        )
+        names = ("observed", "masks", "ahead", "actions", "chosen")
+        batch = {name: np.concatenate([row[name] for row in self._episode]) for name in names}
+        batch |= {"advantages": advantages.ravel(), "returns": (advantages + values).ravel()}
+        self._learner.update(batch, self._rng)
         self.updates += 1
 
 
