@@ -41,6 +41,7 @@ class PolicyGradientEmitter(WorkspaceEmitter):
         workspace: The design problem; must offer ``sample`` and ``valid``.
         designs: Layouts edited side by side.
         horizon: Edits of each, after which the policy learns and other layouts are drawn.
+        best: Designs start from this share of the archive's elites, the best ones; 1 draws from all.
         levels: Values that a gene of real numbers can be set to.
         hidden: Units of each of the two hidden layers.
         learning_rate: Of Adam.
@@ -68,15 +69,16 @@ class PolicyGradientEmitter(WorkspaceEmitter):
         *,
         designs: int = 32,
         horizon: int = 16,
+        best: float = 0.1,
         levels: int = 15,
         hidden: int = 64,
-        learning_rate: float = 1e-3,
+        learning_rate: float = 3e-3,
         epochs: int = 4,
         minibatch: int = 128,
         clip: float = 0.2,
-        discount: float = 0.9,
-        trace: float = 0.9,
-        entropy: float = 0.01,
+        discount: float = 0.0,
+        trace: float = 0.0,
+        entropy: float = 0.003,
         initial: int = 1000,
         seed: Seed = None,
     ) -> None:
@@ -87,11 +89,13 @@ class PolicyGradientEmitter(WorkspaceEmitter):
         for name, value in (("discount", discount), ("trace", trace)):
             real(name, value, 0, 1)
         real("entropy", entropy, 0)
+        real("best", best, 0, 1, closed="right")
         super().__init__(archive, workspace, seed=seed)
         self._edits, self._features = Edits(workspace, levels), GenomeFeatures(workspace)
         self._settings = {
             "designs": int(designs),
             "horizon": int(horizon),
+            "best": float(best),
             "hidden": int(hidden),
             "learning_rate": float(learning_rate),
             "epochs": int(epochs),
@@ -133,7 +137,7 @@ class PolicyGradientEmitter(WorkspaceEmitter):
         if not self._asked:
             return self._workspace.sample(self._initial, self._rng)
         if not self._episode:
-            self._genomes, self._scores = draw_elites(self.archive, len(self._scores), self._rng)
+            self._genomes, self._scores = self._starts()
         masks = self._masks()
         left = 1.0 - len(self._episode) / self._settings["horizon"]
         observed = self._observed(self._genomes, left)
@@ -165,6 +169,14 @@ class PolicyGradientEmitter(WorkspaceEmitter):
         if len(self._episode) == self._settings["horizon"]:
             self._learn()
             self._episode = []
+
+    def _starts(self) -> tuple[npt.NDArray[Any], npt.NDArray[np.float64]]:
+        """``(designs, d)`` elites out of the best share of them, each equally likely, and their scores."""
+        genomes, scores = draw_elites(self.archive, len(self.archive), self._rng, replace=False)
+        count = max(1, round(self._settings["best"] * len(scores)))
+        best = np.argsort(-scores, kind="stable")[:count]
+        rows = best[self._rng.integers(count, size=len(self._scores))]
+        return genomes[rows], scores[rows]
 
     def _observed(self, genomes: npt.NDArray[Any], left: float) -> npt.NDArray[np.float32]:
         """``(n, inputs)`` the layouts, and the share of edits that is left."""
