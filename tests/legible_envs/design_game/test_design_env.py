@@ -24,7 +24,7 @@ from tests.support.shelf_workspace import ShelfWorkspace
 SETTINGS: dict[str, dict[str, Any]] = {
     "kitchen": {"shape": (5, 5), "prefix": "sum"},
     "efficiency": {"shape": (5, 6), "objective": "legible-efficient", "max_distance": 110.0, "edits": 9},
-    "table": {"workspace": "tabletop", "condition": "obstacles", "levels": 5, "edits": 6},
+    "table": {"workspace": "tabletop", "condition": "placement", "max_obstacles": 0, "levels": 5, "edits": 6},
     "continuous": {"workspace": "tabletop", "condition": "placement", "actions": "continuous", "step": 0.3},
     "continuous kitchen": {"shape": (5, 5), "actions": "continuous"},
     "shelf": {"workspace": ShelfWorkspace(), "edits": 7},
@@ -155,7 +155,8 @@ def test_vectors_tell_layouts_apart_and_line_up_with_the_edits() -> None:
 
 
 def test_kitchens_know_their_cells() -> None:
-    workspace = OvercookedWorkspace(shape=(6, 5), stations=("onion", "dish", "pot", "serving"))
+    stations = ("onion", "dish", "pot", "serving")
+    workspace = OvercookedWorkspace(shape=(6, 5), stations=stations, recipes=[["onion"]])
     genomes = workspace.sample(30, np.random.default_rng(0))
     cells = workspace.cells(genomes)
     assert cells.dtype == np.int8
@@ -256,7 +257,7 @@ def test_actions_that_are_none_are_refused(action: Any) -> None:
         env.step(action)
 
 
-@pytest.mark.parametrize("action", [0, np.zeros(3), np.full(16, np.nan), "left"])
+@pytest.mark.parametrize("action", [0, np.zeros(3), np.full(32, np.nan), "left"])
 def test_steps_that_are_none_are_refused(action: Any) -> None:
     env: Any = gym.make(DESIGN_ID, **SETTINGS["continuous"]).unwrapped
     env.reset(seed=0)
@@ -278,7 +279,7 @@ def test_continuous_actions_move_keys_of_valid_layouts() -> None:
     game: Any = env.unwrapped
     check_env(game, skip_render_check=True)
     keys, _ = env.reset(seed=2)
-    action = np.linspace(-1, 1, 16)
+    action = np.linspace(-1, 1, 32)
     after, _, _, _, info = env.step(action)
     assert after[:-2] == pytest.approx(np.clip(keys[:-2] + 0.3 * action, 0, 1), abs=1e-6)
     assert np.allclose(game.workspace.continuous().decode(after[:-2].astype(float)), info["genome"], atol=1e-4)
@@ -312,9 +313,9 @@ def test_specs_go_through_json(arguments: dict[str, Any]) -> None:
 def test_it_pickles_in_mid_episode() -> None:
     env: Any = gym.make(DESIGN_ID, **SETTINGS["continuous"]).unwrapped
     env.reset(seed=0)
-    env.step(np.full(16, 0.5))
+    env.step(np.full(32, 0.5))
     twin = pickle.loads(pickle.dumps(env))
-    assert np.array_equal(env.step(np.full(16, -0.25))[0], twin.step(np.full(16, -0.25))[0])
+    assert np.array_equal(env.step(np.full(32, -0.25))[0], twin.step(np.full(32, -0.25))[0])
 
 
 # -- pictures ----------------------------------------------------------------------------------------------------------

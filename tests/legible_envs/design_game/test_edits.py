@@ -120,5 +120,5 @@ def test_large_ranges_are_edited_in_levels() -> None:
 
     edits = Edits(Wide(), 5)
     assert edits.values[1:6].tolist() == [0, 1250, 2500, 3750, 5000]
-    with pytest.raises(ValueError, match=r"`levels` must be an integer >= 2"):
+    with pytest.raises(ValueError, match=r"`levels` must be an integer from 2 to 1024, got 1"):
         Edits(WORKSPACES["table"], 1)
