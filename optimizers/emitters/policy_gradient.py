@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -21,17 +21,20 @@ if TYPE_CHECKING:
 
 __all__ = ["PolicyGradientEmitter"]
 
+MOST_FEATURES: Final = 2**28
+"""Numbers of all layouts that edits of one episode could lead to: a gibibyte, if all edits were valid."""
+
 
 class PolicyGradientEmitter(WorkspaceEmitter):
     """A designer that learns: proximal policy optimisation on the edits of ``LegibleDesign-v0``; needs PyTorch.
 
-    ``designs`` layouts, drawn from the archive, are edited side by side: at every ``ask`` a neural policy picks one
-    valid edit for each (:class:`~legible_envs.design_game.edits.Edits`; masks come from the workspace's ``valid``, no
-    layout is scored for them) by comparing the layouts that the edits lead to, and these are what is proposed. ``tell`` turns scores into rewards, the
-    change of the objective. After ``horizon`` edits the policy takes some gradient steps on the clipped surrogate of
-    Schulman et al. (*Proximal policy optimization algorithms*, 2017) with generalised advantages, and other layouts are
-    drawn. So every evaluation is a layout that the policy went to, and the archive, budget and checkpoints are those of
-    any other search.
+    ``designs`` layouts, drawn from the archive's best, are edited side by side: at every ``ask`` a neural policy picks
+    one valid edit for each (:class:`~legible_envs.design_game.edits.Edits`; masks come from the workspace's ``valid``)
+    by comparing the layouts that the edits lead to, which takes no score of them. The edited layouts are what is
+    proposed. ``tell`` turns scores into rewards, the change of the objective. After ``horizon`` edits the policy takes
+    some gradient steps on the clipped surrogate of Schulman et al. (*Proximal policy optimization algorithms*, 2017)
+    with generalised advantages, and other layouts are drawn. So every evaluation is a layout that the policy went to,
+    and archive, budget and checkpoints are those of any other search.
 
     Rewards are divided by the median change of score in the first episodes, so that the emitter knows nothing of the
     unit of the objective. A layout without a score is not entered: the design stays where it was, for a reward of 0.
@@ -48,8 +51,9 @@ class PolicyGradientEmitter(WorkspaceEmitter):
         epochs: Passes over the edits of an update.
         minibatch: Edits of a gradient step.
         clip: Most that the probability of an edit gains by, as a share, before its gradient is cut off.
-        discount: Of rewards, per edit.
-        trace: Of generalised advantages (lambda).
+        discount: Of rewards, per edit. By default every edit is for its own gain: with some ten thousand evaluations
+            nothing was learned from the noise of later ones.
+        trace: Of generalised advantages (lambda); without a discount it makes no difference.
         entropy: Weight of the policy's entropy in the loss.
         initial: Random layouts proposed while the archive is empty.
         seed: Seed of everything random: elites, edits, the first weights, and the order of learning.
@@ -92,6 +96,12 @@ class PolicyGradientEmitter(WorkspaceEmitter):
         real("best", best, 0, 1, closed="right")
         super().__init__(archive, workspace, seed=seed)
         self._edits, self._features = Edits(workspace, levels), GenomeFeatures(workspace)
+        room = int(designs) * int(horizon) * self._edits.size * (self._features.size + 1)
+        if room > MOST_FEATURES:
+            raise ValueError(
+                f"`designs` times `horizon` make episodes of up to {room:,} numbers in this workspace; expected at most "
+                f"{MOST_FEATURES:,}"
+            )
         self._settings = {
             "designs": int(designs),
             "horizon": int(horizon),
