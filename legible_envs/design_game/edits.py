@@ -32,7 +32,9 @@ Allowed = Callable[[Genomes], npt.NDArray[np.bool_]]
 
 
 class Edits:
-    """The single edits of layouts of a workspace, in this order:
+    """The single edits of layouts of a workspace, all numbered.
+
+    They come in this order:
 
     1. one that keeps the layout (:data:`KEEP`),
     2. for each gene, one for each value it can be set to; a gene of two whole values, such as the bit of an obstacle,
@@ -86,7 +88,9 @@ class Edits:
         self.size = len(rows)
         self._kinds = np.where(self.partners >= 0, _SWAP, np.where(np.isnan(self.values), _TOGGLE, _SET))
         self._kinds[KEEP] = KEEP
-        self._sets, self._toggles, self._swaps = (np.flatnonzero(self._kinds == kind) for kind in (_SET, _TOGGLE, _SWAP))
+        self._sets, self._toggles, self._swaps = (
+            np.flatnonzero(self._kinds == kind) for kind in (_SET, _TOGGLE, _SWAP)
+        )
         # A gene of two values has the other one when it has their sum less the one it has.
         self._ends = (self._lower + self._upper).astype(self._dtype)
 

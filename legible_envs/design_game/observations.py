@@ -39,9 +39,9 @@ class GenomeFeatures:
     """Genomes as numbers in [0, 1] for a small network: one-hot where a gene is a choice, else scaled.
 
     Whole-numbered genes say *which* place, so that their size means little: each is one number per value, 1 for the
-    value it has, in the order of :class:`.Edits`. A gene of two values is one number, 0 or 1. A gene of real numbers (or
-    of more than 1,024 whole ones) is one number, its share of the way between its bounds. Genes whose bounds are equal
-    are left out.
+    value it has, in the order of :class:`.Edits`. A gene of two values is one number, 0 or 1. A gene of real numbers
+    (or of more than 1,024 whole ones) is one number, its share of the way between its bounds. Genes whose bounds are
+    equal are left out.
 
     Args:
         workspace: The design problem.

@@ -38,7 +38,9 @@ def read_workspace(workspace: Any, settings: Mapping[str, Any]) -> Workspace:
     """
     if isinstance(workspace, Workspace):
         if settings:
-            raise ValueError(f"settings {sorted(settings)} are for a workspace given by name, not for {shown(workspace)}")
+            raise ValueError(
+                f"settings {sorted(settings)} are for a workspace given by name, not for {shown(workspace)}"
+            )
         return workspace
     if not isinstance(workspace, str | Mapping):
         raise ValueError(
@@ -53,8 +55,8 @@ class DesignProblem:
 
     Args:
         workspace: The design problem.
-        objective: Name known to ``workspace.objective``; ``"module:function"``; or a callable from ``(n, d)`` genomes to
-            ``(n,)`` numbers. NaN and negative infinity mean that a layout is not allowed.
+        objective: Name known to ``workspace.objective``; ``"module:function"``; or a callable from ``(n, d)`` genomes
+            to ``(n,)`` numbers. NaN and negative infinity mean that a layout is not allowed.
         max_distance: Layouts with a longer distance are not allowed; None means no cap.
 
     Attributes:

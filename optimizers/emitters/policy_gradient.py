@@ -99,8 +99,8 @@ class PolicyGradientEmitter(WorkspaceEmitter):
         room = int(designs) * int(horizon) * self._edits.size * (self._features.size + 1)
         if room > MOST_FEATURES:
             raise ValueError(
-                f"`designs` times `horizon` make episodes of up to {room:,} numbers in this workspace; expected at most "
-                f"{MOST_FEATURES:,}"
+                f"`designs` times `horizon` make episodes of up to {room:,} numbers in this workspace; expected "
+                f"at most {MOST_FEATURES:,}"
             )
         self._settings = {
             "designs": int(designs),

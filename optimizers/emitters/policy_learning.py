@@ -26,8 +26,8 @@ MOST_GRADIENT: Final = 0.5
 class Learner:
     """A policy over edits with a value, and its updates (Schulman et al., 2017).
 
-    The policy looks one edit ahead: a network gives each layout that a valid edit leads to a number, and edits are drawn
-    from the softmax of these. So what is learned of one layout counts for every edit that leads to one like it; a
+    The policy looks one edit ahead: a network gives a number to each layout that a valid edit leads to, and edits are
+    drawn from the softmax of these. So what is learned of one layout counts for every edit that leads to one like it; a
     network with an output per edit would have to learn each edit by itself, from some thousands of samples. The value
     of a layout comes from the same hidden layers.
 

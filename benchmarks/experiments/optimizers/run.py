@@ -54,7 +54,7 @@ def reproduce(
     if settings.learned_budgets and find_spec("torch") is None:
         settings = dataclasses.replace(settings, learned_budgets=())
         warnings.warn(
-            f"left out of the comparison: {', '.join(LEARNED)}, which needs PyTorch (pip install \"legible-envs[torch]\")",
+            f'left out of the comparison: {", ".join(LEARNED)}, which needs PyTorch: pip install "legible-envs[torch]"',
             stacklevel=2,
         )
     log_trials(run_search, trials_of(settings), Path(folder) / "searches.csv", hidden=_HIDDEN, **how)

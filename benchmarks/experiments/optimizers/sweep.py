@@ -71,7 +71,7 @@ class Settings:
         large: Larger budgets, or more seeds at one of ``budgets``, each with its grid and number of seeds; few methods
             run them, as they take time.
         large_methods: These methods.
-        learned_budgets: Those of ``budgets`` that designers that learn are given too: they take a hundred times as long.
+        learned_budgets: Those of ``budgets`` that designers that learn are given too: they take much longer.
         iterations: Whether the paper's budgets in iterations are run too.
         prefix: Which prefixes count in the score; see ``OvercookedWorkspace``.
     """

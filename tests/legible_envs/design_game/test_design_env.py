@@ -267,7 +267,10 @@ def test_steps_that_are_none_are_refused(action: Any) -> None:
 
 
 def test_an_objective_that_breaks_its_contract_is_named() -> None:
-    for wrong, message in ((lambda g: np.zeros(3), "one number per genome"), (lambda g: np.full(len(g), np.inf), "inf")):
+    for wrong, message in (
+        (lambda g: np.zeros(3), "one number per genome"),
+        (lambda g: np.full(len(g), np.inf), "inf"),
+    ):
         with pytest.raises(ValueError, match=message):
             gym.make(DESIGN_ID, workspace=ShelfWorkspace(), objective=wrong).reset(seed=0)
     with pytest.raises(LayoutError, match="none of 1,000 random layouts has a score"):

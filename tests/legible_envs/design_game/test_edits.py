@@ -20,7 +20,12 @@ FOUR = ("onion", "dish", "pot", "serving")
 WORKSPACES: dict[str, Workspace] = {
     "kitchen": OvercookedWorkspace(shape=(5, 6)),
     "locked kitchen": OvercookedWorkspace(
-        shape=(5, 5), locked={"pot": (0, 2)}, forbidden=[(2, 2)], distinct_access=True, stations=FOUR, recipes=[["onion"]]
+        shape=(5, 5),
+        locked={"pot": (0, 2)},
+        forbidden=[(2, 2)],
+        distinct_access=True,
+        stations=FOUR,
+        recipes=[["onion"]],
     ),
     "table": TabletopWorkspace(),
     "obstacles": TabletopWorkspace(condition="obstacles"),
@@ -101,7 +106,9 @@ def test_every_layout_of_a_kitchen_can_be_reached() -> None:
         reached = edits.candidates(frontier)[edits.masks(frontier, workspace.valid)]
         frontier = np.array([g for g in np.unique(reached, axis=0) if g.tobytes() not in seen]).reshape(-1, 8)
         frontier = frontier.astype(workspace.genome_dtype)
-    slots = np.stack(np.meshgrid(*[np.arange(n) for n in (8, 8, 8, 8, 2, 2, 2, 2)], indexing="ij"), axis=-1).reshape(-1, 8)
+    slots = np.stack(np.meshgrid(*[np.arange(n) for n in (8, 8, 8, 8, 2, 2, 2, 2)], indexing="ij"), axis=-1).reshape(
+        -1, 8
+    )
     everything = slots[workspace.valid(slots)]
     assert len(seen) == len(everything) > 100
 
