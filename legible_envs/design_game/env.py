@@ -176,7 +176,7 @@ class DesignEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], Any]):
             self.action_space = spaces.Box(-1.0, 1.0, (self._keys.solution_dim,), dtype=np.float32)
         self._features = GenomeFeatures(self.workspace)
         self.obs_type = self._checked_obs_type(obs_type)
-        self.observation_space = self._observed_space()
+        self.observation_space: spaces.Space[Any] = self._observed_space()
         self._own = None if layout is None else self.problem.read(layout)
         self._chosen: npt.NDArray[Any] | None = None
         self._begun = False

@@ -213,4 +213,4 @@ def _read_objective(workspace: Workspace, objective: str | Scorer) -> Scorer:
             f"`objective` must be one of {list(get_args(ObjectiveName))}, 'module:function' or a callable on genomes, "
             f"got {shown(objective)}"
         )
-    return cast("Scorer", found)
+    return found

@@ -133,7 +133,7 @@ class PolicyGradientEmitter(WorkspaceEmitter):
                 'the emitter "ppo" needs PyTorch, which is not installed: pip install "legible-envs[torch]"'
             ) from error
         known = ("hidden", "learning_rate", "epochs", "minibatch", "clip", "entropy")
-        settings = {name: self._settings[name] for name in known}
+        settings: dict[str, Any] = {name: self._settings[name] for name in known}
         return Learner(self._features.size + 1, self._rng, **settings)
 
     @property
