@@ -356,3 +356,18 @@ def test_a_window_shows_every_edit() -> None:
     env.step(0)
     assert env.render() is None
     env.close()
+
+
+# -- learners ----------------------------------------------------------------------------------------------------------
+
+
+def test_maskable_ppo_takes_it_as_it_is() -> None:
+    contrib = pytest.importorskip("sb3_contrib")
+    env = gym.make(DESIGN_ID, shape=(5, 5), obs_type="vector", edits=8)
+    model = contrib.MaskablePPO("MlpPolicy", env, n_steps=32, batch_size=32, n_epochs=1, seed=0).learn(64)
+    observation, info = env.reset(seed=1)
+    for _ in range(8):
+        action, _ = model.predict(observation, action_masks=info["action_mask"])
+        assert info["action_mask"][action]
+        observation, _, _, _, info = env.step(action)
+    assert info["num_refused"] == 0
