@@ -408,6 +408,12 @@ class TabletopWorkspace(Workspace):
     def _one(self, genome: npt.ArrayLike | TabletopLayout) -> TabletopLayout:
         return self.decode(self.encode(genome) if isinstance(genome, TabletopLayout) else genome)
 
+    def draw(self, genome: npt.ArrayLike | TabletopLayout) -> npt.NDArray[np.uint8]:
+        """``(height, 640, 3)`` picture of one table, with the places to build at."""
+        from legible_envs.tabletop.rendering.table import draw_table
+
+        return draw_table(self._one(genome), task=self.task)
+
     def summary(self, genome: npt.ArrayLike | TabletopLayout) -> dict[str, Any]:
         """Score, distance and what belongs beside them.
 
