@@ -19,9 +19,10 @@ from gymnasium.vector import VectorEnv
 from torch import Tensor, nn
 
 from benchmarks.experiments.learning.environments import PlayerSpace, final_observations
+from benchmarks.experiments.learning.guidance import Guide
 from benchmarks.experiments.learning.networks import ActorCritic
 from benchmarks.experiments.learning.normalising import RunningMoments, normalised
-from benchmarks.experiments.learning.settings import TrainingSettings
+from benchmarks.experiments.learning.settings import PPOSettings, TrainingSettings
 
 __all__ = ["PPO", "Episode", "Games", "Rollout", "Seconds", "advantages", "collect"]
 
@@ -83,7 +84,8 @@ class Games:
         infos: Infos of this moment.
         scores: ``(N,)`` sums of rewards so far.
         lengths: ``(N,)`` steps so far.
-        discounted: ``(N,)`` discounted sums of rewards so far, for the running deviation.
+        discounted: ``(N * players,)`` discounted sums of rewards so far, for the running deviation.
+        guide: Adds potential-based rewards, which scores do not count; None: nothing does.
         ended: Episodes that have ended since the list was emptied.
     """
 
@@ -94,14 +96,19 @@ class Games:
     scores: Floats
     lengths: npt.NDArray[np.int64]
     discounted: Floats
+    guide: Guide | None = None
     ended: list[Episode] = field(default_factory=list)
 
     @classmethod
-    def begin(cls, envs: VectorEnv[Any, Any, Any], space: PlayerSpace, seed: int) -> Games:
+    def begin(cls, envs: VectorEnv[Any, Any, Any], space: PlayerSpace, settings: PPOSettings, seed: int) -> Games:
         """Start all games."""
-        obs, infos = envs.reset(seed=seed)
         count = envs.num_envs
-        return cls(envs, space, obs, infos, np.zeros(count), np.zeros(count, dtype=np.int64), np.zeros(count))
+        guide = Guide(envs, space, settings.guide, settings.gamma) if settings.guide else None
+        obs, infos = envs.reset(seed=seed)
+        if guide is not None:
+            guide.begin(obs, infos)
+        scores, lengths = np.zeros(count), np.zeros(count, dtype=np.int64)
+        return cls(envs, space, obs, infos, scores, lengths, np.zeros(count * space.players), guide)
 
     def rows(self, obs: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """``(k * players, ...)`` observations of players, of ``(k, ...)`` games."""
@@ -148,7 +155,7 @@ class PPO:
         return normalised(obs, self.obs_moments.mean, self.obs_moments.variance)
 
     def gained(self, games: Games, rewards: Floats, done: Flags) -> Floats:
-        """Rewards of a step as they are learned from."""
+        """``(B,)`` rewards of a step as they are learned from; ``done`` is of the same shape."""
         if not self.settings.normalise_rewards:
             return rewards
         games.discounted = games.discounted * self.settings.gamma + rewards
@@ -204,7 +211,7 @@ class PPO:
         choices, values = self.network(rows.obs, rows.masks)
         change = choices.log_probs(rows.actions) - rows.log_probs
         ratio = change.exp()
-        better = (rows.advantages - rows.advantages.mean()) / (rows.advantages.std() + 1e-8)
+        better = (rows.advantages - rows.advantages.mean()) / rows.advantages.std().clamp(min=settings.least_deviation)
         policy_loss = -torch.min(ratio * better, ratio.clamp(1 - settings.clip, 1 + settings.clip) * better).mean()
         error = (values - rows.returns).square()
         if settings.clip_value:
@@ -270,8 +277,9 @@ def collect(games: Games, learner: PPO, length: int, seconds: Seconds) -> Rollou
         length: Steps of each game.
         seconds: Counts the time it took.
     """
-    settings, steps, ends = learner.settings, [], []
-    rewards = np.zeros((length, games.envs.num_envs))
+    settings, players, steps = learner.settings, games.space.players, []
+    rewards = np.zeros((length, games.envs.num_envs * players))
+    ends = np.zeros(rewards.shape, dtype=np.bool_)
     for t in range(length):
         before = time.perf_counter()
         obs = learner.seen(games.rows(games.obs), learn=True)
@@ -281,21 +289,19 @@ def collect(games: Games, learner: PPO, length: int, seconds: Seconds) -> Rollou
         begun = time.perf_counter()
         gains, terminated, truncated, infos = _step(games, steps[-1][2])
         after = time.perf_counter()
-        done = terminated | truncated
-        rewards[t] = learner.gained(games, gains, done)
+        ends[t] = np.repeat(terminated | truncated, players)
+        rewards[t] = learner.gained(games, gains.reshape(-1), ends[t])
         cut_off = np.flatnonzero(truncated & ~terminated)
         if len(cut_off):  # not over: the rest would have been worth this
-            last = learner.seen(games.rows(final_observations(infos, cut_off)))
-            rewards[t, cut_off] += settings.gamma * learner.values(last).reshape(len(cut_off), -1).mean(axis=1)
-        ends.append(done)
+            last = learner.values(learner.seen(games.rows(final_observations(infos, cut_off))))
+            rewards[t].reshape(-1, players)[cut_off] += settings.gamma * last.reshape(-1, players)
         seconds.environment += after - begun
         seconds.acting += time.perf_counter() - before - (after - begun)
-    obs, masks_, actions_, log_probs_, values_ = zip(*steps, strict=True)
-    each = np.repeat(rewards, games.space.players, axis=1), np.repeat(np.array(ends), games.space.players, axis=1)
+    seen, masks_, actions_, log_probs_, values_ = zip(*steps, strict=True)
     last_values = learner.values(learner.seen(games.rows(games.obs)))
-    found = advantages(each[0], np.array(values_), last_values, each[1], settings.gamma, settings.gae_lambda)
+    found = advantages(rewards, np.array(values_), last_values, ends, settings.gamma, settings.gae_lambda)
     return Rollout(
-        np.array(obs),
+        np.array(seen),
         None if masks_[0] is None else np.array(masks_),
         np.array(actions_),
         np.array(log_probs_),
@@ -305,7 +311,7 @@ def collect(games: Games, learner: PPO, length: int, seconds: Seconds) -> Rollou
 
 
 def _step(games: Games, actions: npt.NDArray[Any]) -> tuple[Floats, Flags, Flags, dict[str, Any]]:
-    """Advance all games, and keep count of their episodes."""
+    """Advance all games, and keep count of their episodes; gains are ``(N, players)``, the team's to each."""
     space, count = games.space, games.envs.num_envs
     if space.actions == "continuous":
         low, high = games.envs.single_action_space.low, games.envs.single_action_space.high  # type: ignore[attr-defined]
@@ -318,7 +324,10 @@ def _step(games: Games, actions: npt.NDArray[Any]) -> tuple[Floats, Flags, Flags
     for i in np.flatnonzero(terminated | truncated):
         games.ended.append(Episode(float(games.scores[i]), int(games.lengths[i]), bool(terminated[i])))
         games.scores[i], games.lengths[i] = 0.0, 0
-    return np.asarray(gains, dtype=np.float64), terminated, truncated, games.infos
+    each = np.repeat(np.asarray(gains, dtype=np.float64)[:, None], space.players, axis=1)
+    if games.guide is not None:
+        each += games.guide.rewards(games.obs, terminated, games.infos)
+    return each, terminated, truncated, games.infos
 
 
 def _between(first: float, last: float, progress: float) -> float:

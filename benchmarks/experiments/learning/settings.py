@@ -60,7 +60,10 @@ class PPOSettings(FileModel):
         entropy: Weight of the entropy at the beginning (``ent_coef``); it falls linearly to ``final_entropy``.
         final_entropy: Weight of the entropy at the end.
         value_weight: Of the critic's loss (``vf_coef``).
+        least_deviation: Advantages of a minibatch are divided by their deviation, or by this where it is less: where
+            nothing is gained, their differences are noise, which must not be made large.
         max_gradient: Norm to which gradients are cut (``max_grad_norm``).
+        guide: Kitchens: potential-based reward for every move nearer to a valid goal; see :class:`.Guide`.
         masked: Whether actions that do nothing are left out, where the environment says which those are.
         normalise_observations: Whether observations are shifted and scaled by running means and deviations.
         normalise_rewards: Whether rewards are scaled by the running deviation of discounted returns.
@@ -79,10 +82,12 @@ class PPOSettings(FileModel):
     entropy: NotNegative = 0.05
     final_entropy: NotNegative = 0.05
     value_weight: NotNegative = 0.5
+    least_deviation: Positive = 0.1
     max_gradient: Positive = 0.5
+    guide: NotNegative = 0.0
     masked: Annotated[bool, Flag()] = True
     normalise_observations: Annotated[bool, Flag()] = False
-    normalise_rewards: Annotated[bool, Flag()] = False
+    normalise_rewards: Annotated[bool, Flag()] = True
 
 
 class TrainingSettings(FileModel):
