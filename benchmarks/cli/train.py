@@ -36,7 +36,7 @@ _EPISODES: Final = 64
               help="Kitchens: draw another for every episode.")  # fmt: skip
 @click.option("--shape", nargs=2, type=click.IntRange(3, 64), metavar="ROWS COLS", help="Kitchens: their size.")
 @click.option("--recipe", "recipe_list", multiple=True, metavar="A,B,…",
-              help="Kitchens: an ordered soup by its ingredients; repeatable. [default: the paper's three]")  # fmt: skip
+              help="Kitchens: an ordered soup by its ingredients; repeatable. [default: three]")  # fmt: skip
 @click.option("--obs", type=click.Choice(["vector", "grid"]), help="Kitchens: what a cook sees. [default: vector]")
 @click.option("--num-players", type=click.IntRange(1, 4), help="Kitchens: cooks, all played by one network.")
 @click.option("--steps", type=click.IntRange(1, 10**12), help="Of all games. [default: 2000000; tables 1000000]")

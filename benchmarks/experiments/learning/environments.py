@@ -60,8 +60,8 @@ class PlayerSpace(FileModel):
             actions, size, players, shape = "discrete", int(done.nvec[0]), len(done.nvec), shape[1:]
         else:
             raise ValueError(
-                "expected actions of Discrete(n), of a Box of one dimension, or of MultiDiscrete([n] * players) with as "
-                f"many observations, got {done} and observations of shape {tuple(shape)}"
+                "expected actions of Discrete(n), of a Box of one dimension, or of MultiDiscrete([n] * players) "
+                f"with as many observations, got {done} and observations of shape {tuple(shape)}"
             )
         if len(shape) not in (1, 3):
             raise ValueError(f"expected observations of shape (size,) or (rows, columns, channels), got {tuple(shape)}")

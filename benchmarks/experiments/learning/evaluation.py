@@ -14,15 +14,13 @@ from benchmarks.experiments.learning.settings import Environment
 
 __all__ = ["Player", "evaluate_policy", "evaluate_scripted", "play_episodes", "summary"]
 
-Player = Callable[[Any, Mapping[str, Any]], Any]
+Player = Callable[[Any, dict[str, Any]], Any]
 
 _AT_A_TIME = 16
 """Games."""
 
 
-def play_episodes(
-    envs: VectorEnv[Any, Any, Any], player: Player, each: int, seed: int
-) -> list[dict[str, float]]:
+def play_episodes(envs: VectorEnv[Any, Any, Any], player: Player, each: int, seed: int) -> list[dict[str, float]]:
     """Play the same number of episodes of every game: counting the first that end would favour short ones.
 
     Args:

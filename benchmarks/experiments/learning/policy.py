@@ -46,9 +46,7 @@ class TrainedPolicy:
         settings: Of the training.
     """
 
-    def __init__(
-        self, checkpoint: Checkpoint, *, greedy: bool = False, rng: np.random.Generator | None = None
-    ) -> None:
+    def __init__(self, checkpoint: Checkpoint, *, greedy: bool = False, rng: np.random.Generator | None = None) -> None:
         self.space: PlayerSpace = checkpoint.space
         self.settings = checkpoint.settings
         self.greedy = greedy
@@ -60,7 +58,7 @@ class TrainedPolicy:
         """The next actions.
 
         Args:
-            obs: Observation of one player, or of ``(players,)``, ``(N,)`` or ``(N, players)``, with these axes in front.
+            obs: Observation of one player, or those of several, with axes such as ``(N, players)`` in front.
             info: What came with it; its ``action_mask``, if there is one, has the same axes in front.
 
         Returns:

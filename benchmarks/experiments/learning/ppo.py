@@ -1,8 +1,8 @@
 """Proximal policy optimisation (Schulman et al. 2017), masked and for several players, in one file.
 
 ``collect`` plays games and gathers what each player saw, did and gained; ``PPO.update`` learns from it. Players of one
-game share the network: ``(N, players, ...)`` observations are ``N * players`` rows, and each row gains the team's reward.
-All randomness comes from one ``numpy.random.Generator``.
+game share the network: ``(N, players, ...)`` observations are ``N * players`` rows, and each row gains the team's
+reward. All randomness comes from one ``numpy.random.Generator``.
 """
 
 from __future__ import annotations
@@ -39,7 +39,8 @@ class Rollout(NamedTuple):
         actions: Actions.
         log_probs: Logarithms of the probabilities with which they were taken.
         values: What the critic expected.
-        advantages: How much better it went than expected; see :func:`advantages`.
+        advantages: How much better it went than expected; see :func:`advantages`; with what guides cooks.
+        returns: What the critic should have expected.
     """
 
     obs: npt.NDArray[Any]
@@ -48,6 +49,7 @@ class Rollout(NamedTuple):
     log_probs: npt.NDArray[np.float32]
     values: npt.NDArray[np.float32]
     advantages: npt.NDArray[np.float32]
+    returns: npt.NDArray[np.float32]
 
 
 class Episode(NamedTuple):
@@ -85,7 +87,7 @@ class Games:
         scores: ``(N,)`` sums of rewards so far.
         lengths: ``(N,)`` steps so far.
         discounted: ``(N * players,)`` discounted sums of rewards so far, for the running deviation.
-        guide: Adds potential-based rewards, which scores do not count; None: nothing does.
+        guide: Tells whether steps led nearer to valid goals; None: nothing does.
         ended: Episodes that have ended since the list was emptied.
     """
 
@@ -103,7 +105,7 @@ class Games:
     def begin(cls, envs: VectorEnv[Any, Any, Any], space: PlayerSpace, settings: PPOSettings, seed: int) -> Games:
         """Start all games."""
         count = envs.num_envs
-        guide = Guide(envs, space, settings.guide, settings.gamma) if settings.guide else None
+        guide = Guide(envs, space) if settings.guide else None
         obs, infos = envs.reset(seed=seed)
         if guide is not None:
             guide.begin(obs, infos)
@@ -268,18 +270,22 @@ def advantages(
     return found
 
 
-def collect(games: Games, learner: PPO, length: int, seconds: Seconds) -> Rollout:
+def collect(games: Games, learner: PPO, length: int, seconds: Seconds, progress: float = 0.0) -> Rollout:
     """Play ``length`` steps of all games.
+
+    Where games have a guide, ``settings.guide`` for every step nearer to a valid goal is added to advantages, and
+    subtracted for one farther away: less with progress, and nothing from ``settings.guide_until`` on.
 
     Args:
         games: Under way; they are further when this returns.
         learner: Plays all players.
         length: Steps of each game.
         seconds: Counts the time it took.
+        progress: Share of the training that is over, from 0 to 1.
     """
     settings, players, steps = learner.settings, games.space.players, []
     rewards = np.zeros((length, games.envs.num_envs * players))
-    ends = np.zeros(rewards.shape, dtype=np.bool_)
+    nearer, ends = np.zeros(rewards.shape), np.zeros(rewards.shape, dtype=np.bool_)
     for t in range(length):
         before = time.perf_counter()
         obs = learner.seen(games.rows(games.obs), learn=True)
@@ -290,7 +296,9 @@ def collect(games: Games, learner: PPO, length: int, seconds: Seconds) -> Rollou
         gains, terminated, truncated, infos = _step(games, steps[-1][2])
         after = time.perf_counter()
         ends[t] = np.repeat(terminated | truncated, players)
-        rewards[t] = learner.gained(games, gains.reshape(-1), ends[t])
+        rewards[t] = learner.gained(games, np.repeat(gains, players), ends[t])
+        if games.guide is not None:
+            nearer[t] = games.guide.nearer(games.obs, gains, infos).reshape(-1)
         cut_off = np.flatnonzero(truncated & ~terminated)
         if len(cut_off):  # not over: the rest would have been worth this
             last = learner.values(learner.seen(games.rows(final_observations(infos, cut_off))))
@@ -306,12 +314,13 @@ def collect(games: Games, learner: PPO, length: int, seconds: Seconds) -> Rollou
         np.array(actions_),
         np.array(log_probs_),
         np.array(values_),
-        found.astype(np.float32),
+        (found + settings.guide * max(0.0, 1 - progress / settings.guide_until) * nearer).astype(np.float32),
+        (found + np.array(values_)).astype(np.float32),
     )
 
 
 def _step(games: Games, actions: npt.NDArray[Any]) -> tuple[Floats, Flags, Flags, dict[str, Any]]:
-    """Advance all games, and keep count of their episodes; gains are ``(N, players)``, the team's to each."""
+    """Advance all games, and keep count of their episodes."""
     space, count = games.space, games.envs.num_envs
     if space.actions == "continuous":
         low, high = games.envs.single_action_space.low, games.envs.single_action_space.high  # type: ignore[attr-defined]
@@ -324,10 +333,7 @@ def _step(games: Games, actions: npt.NDArray[Any]) -> tuple[Floats, Flags, Flags
     for i in np.flatnonzero(terminated | truncated):
         games.ended.append(Episode(float(games.scores[i]), int(games.lengths[i]), bool(terminated[i])))
         games.scores[i], games.lengths[i] = 0.0, 0
-    each = np.repeat(np.asarray(gains, dtype=np.float64)[:, None], space.players, axis=1)
-    if games.guide is not None:
-        each += games.guide.rewards(games.obs, terminated, games.infos)
-    return each, terminated, truncated, games.infos
+    return np.asarray(gains, dtype=np.float64), terminated, truncated, games.infos
 
 
 def _between(first: float, last: float, progress: float) -> float:
@@ -336,10 +342,7 @@ def _between(first: float, last: float, progress: float) -> float:
 
 def _flatten(rollout: Rollout) -> _Rows:
     """All rows of a rollout, one below the other."""
-    flat = [None if part is None else torch.from_numpy(part.reshape(-1, *part.shape[2:])) for part in rollout]
-    obs, masks, actions, log_probs, values, better = flat
-    assert not (obs is None or actions is None or log_probs is None or values is None or better is None)
-    return _Rows(obs, masks, actions, log_probs, values, better, better + values)
+    return _Rows(*(None if part is None else torch.from_numpy(part.reshape(-1, *part.shape[2:])) for part in rollout))
 
 
 def _minibatches(count: int, size: int, rng: np.random.Generator) -> Iterator[Tensor]:

@@ -29,7 +29,7 @@ def reproduce(
     settings: Settings | None = None,
     **how: Unpack[RunOptions],
 ) -> None:
-    """Run the trainings that have no result yet, and write ``learning.csv``; ``sections`` makes tables and figures of it.
+    """Run the trainings that have no result yet, and write ``learning.csv``, of which ``sections`` makes tables.
 
     Args:
         folder: Folder of the experiment.
@@ -53,11 +53,12 @@ def reproduce(
     folder = Path(folder)
     kitchens: list[dict[str, Any]] = []
     if any(TASKS[name].elsewhere for name in settings.tasks):
-        conditions = Conditions(
-            layouts=settings.layouts, initial=settings.initial, improvements=settings.improvements
-        )
+        conditions = Conditions(layouts=settings.layouts, initial=settings.initial, improvements=settings.improvements)
         found = log_trials(find_layout, layout_trials(conditions), folder / "layouts.csv", **how)
-        kitchens = found[found["table"] == "layout"][["condition", "drawing"]].to_dict("records")
+        own = found[found["table"] == "layout"]
+        kitchens = [
+            {"condition": name, "drawing": at} for name, at in zip(own["condition"], own["drawing"], strict=True)
+        ]
     log_trials(learn, trials_of(settings, kitchens), folder / "learning.csv", hidden=_HIDDEN, **how)
 
 
@@ -98,15 +99,19 @@ def _play(where: str, environment: Environment, players: Mapping[str, Any], epis
 
     try:
         rows = [
-            {"table": "played", "where": where, "player": name, **summary(evaluate_policy(policy, environment, episodes, 1))}
+            {
+                "table": "played",
+                "where": where,
+                "player": name,
+                **summary(evaluate_policy(policy, environment, episodes, 1)),
+            }
             for name, policy in players.items()
         ]
         if "Overcooked" in environment.id:
-            cook = summary(evaluate_scripted(environment, episodes, 1))
-            rows.append({"table": "played", "where": where, "player": "scripted", **cook})
+            played["scripted"] = evaluate_scripted(environment, episodes, 1)
     except LayoutError:
         return []
-    return rows
+    return [{"table": "played", "where": where, "player": name, **summary(rows)} for name, rows in played.items()]
 
 
 def places_of(environment: Environment, kitchens: list[dict[str, Any]]) -> list[tuple[str, Environment]]:

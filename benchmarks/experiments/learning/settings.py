@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Final
 
-from legible_envs.support.models import Flag, FileModel, Length, Real, Text, Whole, validated
+from legible_envs.support.models import FileModel, Flag, Length, Real, Text, Whole, validated
 from legible_envs.support.validation import shown
 
 __all__ = ["Environment", "NetworkShape", "PPOSettings", "TrainingSettings", "changed", "require_torch"]
@@ -63,7 +63,9 @@ class PPOSettings(FileModel):
         least_deviation: Advantages of a minibatch are divided by their deviation, or by this where it is less: where
             nothing is gained, their differences are noise, which must not be made large.
         max_gradient: Norm to which gradients are cut (``max_grad_norm``).
-        guide: Kitchens: potential-based reward for every move nearer to a valid goal; see :class:`.Guide`.
+        guide: Kitchens: added to advantages, at the beginning, for every step nearer to a valid goal; see
+            :class:`.Guide`.
+        guide_until: Share of the training over which that falls linearly to 0.
         masked: Whether actions that do nothing are left out, where the environment says which those are.
         normalise_observations: Whether observations are shifted and scaled by running means and deviations.
         normalise_rewards: Whether rewards are scaled by the running deviation of discounted returns.
@@ -85,6 +87,7 @@ class PPOSettings(FileModel):
     least_deviation: Positive = 0.1
     max_gradient: Positive = 0.5
     guide: NotNegative = 0.0
+    guide_until: Annotated[float, Real(0, 1, closed="right")] = 0.5
     masked: Annotated[bool, Flag()] = True
     normalise_observations: Annotated[bool, Flag()] = False
     normalise_rewards: Annotated[bool, Flag()] = True

@@ -24,8 +24,8 @@ class Task:
         steps: Of all games of a training.
         quick_steps: In the quick version.
         changes: Of the recipe's settings, by path.
-        elsewhere: Whether the policy is tried in other kitchens too: held-out ones, those of the paper's conditions, and
-            those of recorded play.
+        elsewhere: Whether the policy is tried in other kitchens too: held-out ones, those of the paper's conditions,
+            and those of recorded play.
     """
 
     domain: str

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
 from benchmarks.csv_tables import write_table
 from benchmarks.experiments.learning.checkpoints import (
@@ -27,7 +26,7 @@ from legible_envs.support.files import write_text
 if TYPE_CHECKING:
     import pandas as pd
 
-    from benchmarks.experiments.learning.ppo import PPO, Games, Seconds
+    from benchmarks.experiments.learning.ppo import PPO, Games
 
 __all__ = ["COLUMNS", "Moment", "curve_of", "train"]
 
@@ -174,7 +173,7 @@ class _Run:
 
         from benchmarks.experiments.learning.ppo import collect
 
-        rollout = collect(games, self.learner, self.settings.ppo.rollout, self.seconds)
+        rollout = collect(games, self.learner, self.settings.ppo.rollout, self.seconds, self.updates / self.total)
         begun = time.perf_counter()
         said = self.learner.update(rollout, self.updates / self.total)
         self.seconds.learning += time.perf_counter() - begun
@@ -252,7 +251,7 @@ def curve_of(checkpoint: Checkpoint) -> pd.DataFrame:
     import pandas as pd
 
     table = pd.DataFrame(checkpoint.curve, columns=list(checkpoint.columns))
-    whole: dict[str, npt.DTypeLike] = {"steps": np.int64, "episodes": np.int64}
+    whole: dict[str, type[np.int64]] = {"steps": np.int64, "episodes": np.int64}
     return table.astype({name: kind for name, kind in whole.items() if name in table})
 
 

@@ -21,7 +21,6 @@ from benchmarks.experiments.learning.networks import Choices  # noqa: E402
 from benchmarks.experiments.learning.ppo import PPO, Games, Seconds, advantages, collect  # noqa: E402
 from benchmarks.experiments.learning.settings import Environment, PPOSettings, TrainingSettings  # noqa: E402
 from legible_envs.overcooked import OvercookedLayout  # noqa: E402
-
 from tests.benchmarks.learning.conftest import small  # noqa: E402
 
 NUMBERS = st.floats(-5, 5)
@@ -137,7 +136,9 @@ def test_one_network_learns_to_play_both_players() -> None:
 
 def test_an_episode_that_was_cut_off_goes_on_in_the_value_of_its_last_observation() -> None:
     """With a critic that always says 10, no surprise is left where nothing is gained and gamma is 1."""
-    envs = make_envs(Environment(id="LegibleOvercooked-v0", arguments={"obs_type": "vector", "max_episode_steps": 7}), 4)
+    envs = make_envs(
+        Environment(id="LegibleOvercooked-v0", arguments={"obs_type": "vector", "max_episode_steps": 7}), 4
+    )
     space = PlayerSpace.of(envs)
     learning = TrainingSettings(
         environment=Environment(id="none"), ppo=PPOSettings(gamma=1.0, normalise_rewards=False, guide=0.0)
@@ -177,26 +178,64 @@ def test_moves_are_those_of_a_search_by_hand() -> None:
     assert moves[cell["by the onion"], cell["onion"]] == 0
 
 
+KITCHEN = """\
+XPXXX
+O   S
+X   X
+X  1D
+XXXXX
+"""
+
+
 @pytest.mark.parametrize("obs_type", ["vector", "grid"])
-def test_guiding_rewards_sum_to_nothing_but_the_potential_of_the_start(obs_type: str) -> None:
-    """Undiscounted, the rewards of an episode that terminates are minus the potential at its start, whatever is done."""
-    arguments = {"shape": [5, 5], "recipes": [["onion"]], "obs_type": obs_type, "layouts": "random"}
+def test_a_guide_says_nearer_and_farther(obs_type: str) -> None:
+    arguments = {"recipes": [["onion"]], "obs_type": obs_type, "layout": KITCHEN, "cook_time": 1, "shaping": True}
+    envs = make_envs(Environment(id="LegibleOvercooked-v0", arguments=arguments), 2)
+    games = Games.begin(envs, PlayerSpace.of(envs), PPOSettings(guide=0.5), seed=0)
+    assert games.guide is not None
+    north, south, east, west, stay, use = range(6)
+    steps = [
+        (north, 1), (south, -1), (east, 0), (stay, 0), (north, 1), (west, 1), (north, 1), (west, 1),  # to the onion
+        (west, 0), (use, 1), (use, -1), (use, 1),  # take it, put it back, take it
+        (north, 0), (use, 1),  # in the pot, which is rewarded
+        (south, 1), (south, 1), (east, 1), (east, 1), (east, 0), (use, 1),  # the dish
+    ]  # fmt: skip
+    for number, (action, wanted) in enumerate(steps):
+        obs, rewards, _, _, infos = envs.step(np.array([action, stay]))
+        told = games.guide.nearer(obs, rewards, infos)[:, 0]
+        assert told.tolist() == [wanted, 0], f"step {number}: {told}"
+
+
+def test_guides_follow_games_into_other_kitchens() -> None:
+    """Whoever walks to goals by shortest paths comes nearer to some goal, over many random kitchens."""
+    arguments = {"shape": [6, 6], "recipes": [["onion"]], "obs_type": "vector", "layouts": "random"}
     envs = make_envs(Environment(id="LegibleOvercooked-v0", arguments=arguments), 6)
-    space = PlayerSpace.of(envs)
-    games = Games.begin(envs, space, PPOSettings(num_envs=6, guide=0.5, gamma=1.0), seed=0)
+    games = Games.begin(envs, PlayerSpace.of(envs), PPOSettings(guide=0.5), seed=0)
+    assert games.guide is not None
     from legible_envs.overcooked.policies import ScriptedPlayer
 
-    cook, sums, ended = ScriptedPlayer(envs, np.random.default_rng(0)), np.zeros(6), 0
-    assert games.guide is not None
-    obs, infos = games.obs, games.infos
-    begun = games.guide._before[:, 0].copy()
-    for _ in range(150):
-        obs, _, terminated, _, infos = envs.step(cook(obs, infos))
-        sums += games.guide.rewards(obs, terminated, infos)[:, 0]
-        for i in np.flatnonzero(terminated):
-            assert sums[i] == pytest.approx(-begun[i])
-            sums[i], begun[i], ended = 0.0, games.guide._before[i, 0], ended + 1
-    assert ended > 6
+    cook, obs, infos, ended, told = ScriptedPlayer(envs, np.random.default_rng(0)), games.obs, games.infos, 0, []
+    for _ in range(200):
+        obs, rewards, terminated, _, infos = envs.step(cook(obs, infos))
+        ended += int(terminated.sum())
+        told.append(games.guide.nearer(obs, rewards, infos))
+    assert ended > 20
+    counts = np.array(told)
+    assert (counts == 1).sum() > 5 * (counts == -1).sum()
+
+
+def test_what_guides_falls_to_nothing() -> None:
+    settings_ = small(guide=1.0, guide_until=0.5)
+    envs = make_envs(settings_.environment, 8)
+    space = PlayerSpace.of(envs)
+    rollouts = []
+    for progress in (0.0, 0.25, 0.5, 1.0):
+        learner = PPO(space, settings_, observation_scale(envs, space), np.random.default_rng(0))
+        rollouts.append(collect(Games.begin(envs, space, settings_.ppo, 0), learner, 40, Seconds(), progress))
+    added = [rollout.advantages + rollout.values - rollout.returns for rollout in rollouts]
+    for share, found in zip((1.0, 0.5, 0.0, 0.0), added, strict=True):
+        np.testing.assert_allclose(found, share * np.sign(np.round(added[0])), atol=1e-5)
+    assert len(np.unique(np.round(added[0]))) == 3
 
 
 def test_only_kitchens_have_guides() -> None:
