@@ -98,15 +98,7 @@ def _play(where: str, environment: Environment, players: Mapping[str, Any], epis
     from legible_envs.errors import LayoutError
 
     try:
-        rows = [
-            {
-                "table": "played",
-                "where": where,
-                "player": name,
-                **summary(evaluate_policy(policy, environment, episodes, 1)),
-            }
-            for name, policy in players.items()
-        ]
+        played = {name: evaluate_policy(policy, environment, episodes, 1) for name, policy in players.items()}
         if "Overcooked" in environment.id:
             played["scripted"] = evaluate_scripted(environment, episodes, 1)
     except LayoutError:
