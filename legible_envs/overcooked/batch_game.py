@@ -22,6 +22,7 @@ class Games(Protocol):
     single_action_space: Any
     single_observation_space: Any
     render_mode: str | None
+    num_players: int
 
     def layout(self, index: int) -> OvercookedLayout:
         """The kitchen of a game."""
@@ -30,10 +31,13 @@ class Games(Protocol):
         """The random generator of a game and its seed."""
 
     def goals(self, index: int) -> tuple[str, ...]:
-        """Names of the valid goals of a game."""
+        """Names of the first player's valid goals in a game."""
+
+    def goals_of(self, index: int, player: int) -> tuple[str, ...]:
+        """Names of a player's valid goals in a game."""
 
     def action_masks(self, index: int) -> npt.NDArray[np.bool_]:
-        """``(6,)`` actions that do something in a game."""
+        """``(6,)`` actions that do something in a game; with several players ``(num_players, 6)``."""
 
     def view(self, index: int) -> GameView:
         """A snapshot of a game."""
@@ -83,8 +87,17 @@ class GameOfBatch:
 
     @property
     def goals(self) -> tuple[str, ...]:
-        """Names of the valid goals, in reading order."""
+        """Names of the first player's valid goals, in reading order."""
         return self._envs.goals(self._index)
+
+    def goals_of(self, player: int) -> tuple[str, ...]:
+        """Names of a player's valid goals, in reading order."""
+        return self._envs.goals_of(self._index, player)
+
+    @property
+    def num_players(self) -> int:
+        """Number of players."""
+        return self._envs.num_players
 
     @property
     def goal_names(self) -> npt.NDArray[np.str_]:
@@ -93,7 +106,7 @@ class GameOfBatch:
         return np.array(layout.goal_names).reshape(layout.shape)
 
     def action_masks(self) -> npt.NDArray[np.bool_]:
-        """``(6,)`` actions that do something now, staying always."""
+        """``(6,)`` actions that do something now, staying always; with several players ``(num_players, 6)``."""
         return self._envs.action_masks(self._index)
 
     def view(self) -> GameView:

@@ -9,7 +9,6 @@ from typing import Any, Literal
 import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
-from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 
 from legible_envs.drawing.rendered import Rendered
@@ -23,7 +22,7 @@ from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.overcooked.layout_batches import layout_entries
 from legible_envs.overcooked.layouts import read_layout
 from legible_envs.overcooked.rendering.board import draw_small
-from legible_envs.overcooked.settings import NUM_ACTIONS, KitchenSettings, PackedKitchen, read_action
+from legible_envs.overcooked.settings import NUM_ACTIONS, KitchenSettings, PackedKitchen, read_action, read_actions
 from legible_envs.overcooked.trajectories import trajectories_from_states
 from legible_envs.rollouts.trajectory import Trajectory
 from legible_envs.support.per_env import own_entry
@@ -58,6 +57,9 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
     | 3   | West     | turn west (column - 1), and move if the cell is free |
     | 4   | Stay     | nothing |
     | 5   | Interact | take from or put back at a station, put on or pick up from a counter, add to a pot, take a soup with a dish, deliver |
+
+    With `num_players=P` for `P` > 1 it is `MultiDiscrete([6] * P)`: everybody acts at once. Who interacts comes first, in
+    the order of players; then all move, except those who would share or swap cells.
 
     ## Observation Space
 
@@ -94,6 +96,11 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
     | 45 - 50 | tomatoes, onions, cabbages, fish, dishes, soups on counters / 4 |
     | 51 + r  | recipe r is not yet delivered |
 
+    With several players, observations have the shape `(P, ...)`, one for each player as they see the kitchen: "the player"
+    is the one who observes. Grids have five more channels, for the other players: presence, and facing north, south,
+    east, west. Vectors have 13 more entries for each other player, beginning with the next one: rows / (H - 1) and
+    columns / (W - 1) to them, facing (4), and hands (7).
+
     With `obs_type="rgb"` a `Box` of `uint8` and shape `(12 H, 12 W, 3)`: the picture of `render`, smaller.
 
     ## Rewards
@@ -101,12 +108,13 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
     +20 for every delivery. A crossing of a soft virtual obstacle costs `crossing_cost`. With `shaping=True`
     (Overcooked-AI's values) also +3 for an ingredient put in a pot, +3 for a dish fetched while a soup waits for one
     (taken back if it is put back: going to and fro gains nothing), +5 for a soup taken from the pot. A mapping with
-    some of the keys `ingredient`, `dish`, `soup` sets other values.
+    some of the keys `ingredient`, `dish`, `soup` sets other values. Several players get one reward, that of the team.
 
     ## Starting State
 
     The player stands at the layout's first start (`1` in the drawing; by default beside the serving station), facing
-    north with empty hands; pots and counters are empty.
+    north with empty hands; pots and counters are empty. Further players stand at its further starts (`2`, `3`, `4`), or
+    else as far as possible from the others, by steps; see `player_starts`.
 
     The kitchen of an episode is, first match first: the one in `reset(options={"layout": ...})` or set by
     `env.unwrapped.layout = ...` (from the next reset on), which stays until replaced (by None: until then as if never
@@ -115,13 +123,13 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
 
     ## Episode End
 
-    The episode terminates when every ordered soup is delivered. It is truncated after 1,200 steps (Gymnasium's
+    The episode terminates when every ordered soup is delivered (with `rules="overcooked-ai-2019"`: never). It is truncated after 1,200 steps (Gymnasium's
     `max_episode_steps`).
 
     ## Information
 
     Every `reset` and `step` returns fresh numbers and arrays of fixed shape, so that wrappers can stack, convert and
-    record them:
+    record them (with several players `goal_mask` has the shape `(P, H, W)` and `action_mask` `(P, 6)`):
 
     | Key           | Content |
     | ------------- | ------- |
@@ -167,6 +175,9 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
         virtual_obstacles: `"hard"`: they block the player; `"soft"`: they can be crossed, and crossings are counted.
         crossing_cost: What a crossing of a soft virtual obstacle costs.
         shaping: False, True, or a mapping of rewards; see Rewards.
+        num_players: Cooks, 1 to 4, all of whom this environment controls. `parallel_env` deals them out to agents.
+        rules: `"legible"`, or `"overcooked-ai-2019"`: the game of the recordings of 2019, in which one recipe is cooked
+            again and again.
         render_mode: None, `"human"` (a window), `"rgb_array"` or `"ansi"`.
 
     Raises:
@@ -195,6 +206,8 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
         virtual_obstacles: str = "hard",
         crossing_cost: float = 0.0,
         shaping: bool | Mapping[str, float] = False,
+        num_players: int = 1,
+        rules: str = "legible",
         render_mode: str | None = None,
     ) -> None:
         self._set_render_mode(render_mode)
@@ -208,16 +221,19 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
             virtual_obstacles=virtual_obstacles,
             crossing_cost=crossing_cost,
             shaping=shaping,
+            num_players=num_players,
+            rules=rules,
         )
-        self.action_space = spaces.Discrete(NUM_ACTIONS)
+        self.action_space = self.settings.action_space()
         self.observation_space = self.settings.observation_space()
         self._chosen: OvercookedLayout | None = None
         self._pending: PackedKitchen | None = None
-        self._actions = np.zeros(1, dtype=np.int64)
-        self._goals = np.zeros(self.settings.shape[0] * self.settings.shape[1], dtype=np.bool_)
+        self._players = players = self.settings.num_players
+        self._actions = np.zeros(players, dtype=np.int64)
+        self._goals = np.zeros((players, self.settings.shape[0] * self.settings.shape[1]), dtype=np.bool_)
         self._log = bytearray()
         self._begun = False
-        self._observation_shape = self.observation_space.shape
+        self._own_shape = self.settings.player_observation_space().shape
         self._install(self.settings.pack(self.settings.preview()))
 
     # -- the Gymnasium interface --------------------------------------------------------------------------------------
@@ -249,39 +265,44 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
             assert self.settings.distribution is not None
             layout = self.settings.distribution.sample(self.np_random)
         self._enter(layout)
-        mask = np.empty(NUM_ACTIONS, dtype=np.int8)
-        batch.begin(self._state, self._kitchen, self._rules, self._goals, mask)
+        masks = np.empty((self._players, NUM_ACTIONS), dtype=np.int8)
+        batch.begin(self._state, self._kitchen, self._rules, self._goals, masks)
         self._log.clear()
         self._begun = True
         if self.render_mode == "human":
             self.render()
-        return self._observe(), self._info(mask)
+        return self.observe(), self._info(masks)
 
-    def step(self, action: int) -> tuple[npt.NDArray[Any], float, bool, bool, dict[str, Any]]:
+    def step(self, action: Any) -> tuple[npt.NDArray[Any], float, bool, bool, dict[str, Any]]:
         """Advance the game by one tick.
 
         Args:
-            action: An integer 0..5.
+            action: An integer 0..5; with several players ``(num_players,)`` of them.
 
         Returns:
             ``(observation, reward, terminated, truncated, info)``.
 
         Raises:
             ResetNeeded: Before the first reset.
-            ValueError: The action is not an integer 0..5.
+            ValueError: The action is not an integer 0..5, or not one for each player.
         """
         if not self._begun:
             raise ResetNeeded("Cannot call env.step() before calling env.reset()")
-        move = action if type(action) is int and 0 <= action < NUM_ACTIONS else read_action(action)
-        self._actions[0] = move
-        mask = np.empty(NUM_ACTIONS, dtype=np.int8)
-        self._log.append(move)
+        if self._players == 1:
+            move = action if type(action) is int and 0 <= action < NUM_ACTIONS else read_action(action)
+            self._actions[0] = move
+            self._log.append(move)
+        else:
+            moves = read_actions(action, self._players)
+            self._actions[:] = moves
+            self._log.extend(moves)
+        masks = np.empty((self._players, NUM_ACTIONS), dtype=np.int8)
         reward, over, _ = batch.play(
-            self._state, self._kitchen, self._rules, self.settings.weights, self._actions, self._goals, mask
+            self._state, self._kitchen, self._rules, self.settings.weights, self._actions, self._goals, masks
         )
         if self.render_mode == "human":
             self.render()
-        return self._observe(), reward, over, False, self._info(mask)
+        return self.observe(), reward, over, False, self._info(masks)
 
     def _picture(self) -> npt.NDArray[np.uint8]:
         from legible_envs.overcooked.rendering import draw_game
@@ -333,23 +354,30 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
         self._layout_number = int(packed.layout.layout_id, 16)
         self._state = np.zeros(int(packed.rules[STATE_SIZE]), dtype=np.int32)
 
-    def _observe(self) -> npt.NDArray[Any]:
+    def observe(self) -> npt.NDArray[Any]:
+        """The observation of this moment, made anew."""
+        if self._players == 1:
+            return self._observe_as(0)
+        return np.stack([self._observe_as(player) for player in range(self._players)])
+
+    def _observe_as(self, player: int) -> npt.NDArray[Any]:
         obs_type = self.settings.obs_type
         if obs_type == "grid":
-            grid = np.zeros(self._observation_shape, dtype=np.uint8)
-            grid_observation(self._state, self._kitchen, self._rules, grid)
+            grid = np.zeros(self._own_shape, dtype=np.uint8)
+            grid_observation(self._state, self._kitchen, self._rules, player, grid)
             return grid
         if obs_type == "vector":
-            features = np.zeros(self._observation_shape, dtype=np.float32)
-            vector_observation(self._state, self._kitchen, self._rules, self._packed.routes, features)
+            features = np.zeros(self._own_shape, dtype=np.float32)
+            vector_observation(self._state, self._kitchen, self._rules, self._packed.routes, player, features)
             return features
         return draw_small(self.view())
 
-    def _info(self, mask: npt.NDArray[np.int8]) -> dict[str, Any]:
+    def _info(self, masks: npt.NDArray[np.int8]) -> dict[str, Any]:
         deliveries = self._state.item(DELIVERIES)
+        goals = self._goals.reshape(self._players, *self.settings.shape).copy()
         return {
-            "goal_mask": self._goals.reshape(self.settings.shape).copy(),
-            "action_mask": mask,
+            "goal_mask": goals[0] if self._players == 1 else goals,
+            "action_mask": masks[0] if self._players == 1 else masks,
             "layout_id": self._layout_number,
             "num_done": deliveries,
             "deliveries": deliveries,
@@ -367,9 +395,18 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
         return self._state, self._kitchen, self._rules
 
     @property
+    def num_players(self) -> int:
+        """Number of players."""
+        return self._players
+
+    @property
     def goals(self) -> tuple[str, ...]:
-        """Names of the valid goals, in reading order: those that ``info["goal_mask"]`` marks."""
-        return name_goals(self._packed.layout, self._goals)
+        """Names of the first player's valid goals, in reading order: those that ``info["goal_mask"]`` marks."""
+        return self.goals_of(0)
+
+    def goals_of(self, player: int) -> tuple[str, ...]:
+        """Names of a player's valid goals, in reading order."""
+        return name_goals(self._packed.layout, self._goals[player])
 
     @property
     def goal_names(self) -> npt.NDArray[np.str_]:
@@ -379,16 +416,17 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
     def action_masks(self) -> npt.NDArray[np.bool_]:
         """``(6,)`` actions that do something now, staying always; the others would leave the game as it is.
 
-        The name is the one that ``MaskablePPO`` of sb3-contrib calls; ``info["action_mask"]`` says the same as int8.
+        With several players ``(num_players, 6)``. The name is the one that ``MaskablePPO`` of sb3-contrib calls;
+        ``info["action_mask"]`` says the same as int8.
 
         Raises:
             ResetNeeded: Before the first reset.
         """
         if not self._begun:
             raise ResetNeeded("Cannot call env.action_masks() before calling env.reset()")
-        masks = np.empty((1, NUM_ACTIONS), dtype=np.int8)
+        masks = np.empty((1, self._players, NUM_ACTIONS), dtype=np.int8)
         batch.find_all_actions(self._state[None], self._kitchen[None], self._rules, masks)
-        return masks[0].astype(np.bool_)
+        return (masks[0, 0] if self._players == 1 else masks[0]).astype(np.bool_)
 
     def trajectories(
         self,
@@ -396,6 +434,7 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
         participant: str = "",
         condition: str = "",
         candidate_set: Literal["game", "all"] = "game",
+        player: int = 0,
         **options: Any,
     ) -> list[Trajectory]:
         """The trajectories of this episode so far, in order: empty-handed from a pot or serving station to a dispenser.
@@ -407,17 +446,19 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
             condition: Under which condition.
             candidate_set: Whether the candidates are the goals valid in the running game when the trajectory begins, or
                 all in reach.
+            player: Whose trajectories.
             **options: Of :func:`~legible_envs.overcooked.trajectories.trajectories_from_states`: ``layout_name``,
                 ``seconds_per_tick``, ``min_positions``, ``min_candidates``.
         """
-        actions = np.frombuffer(bytes(self._log), dtype=np.uint8).astype(np.int64).reshape(-1, 1)
+        actions = np.frombuffer(bytes(self._log), dtype=np.uint8).astype(np.int64).reshape(-1, self._players)
         states = np.empty((len(actions) + 1, len(self._state)), dtype=np.int32)
-        goals = np.empty((len(states), len(self._goals)), dtype=np.bool_)
+        goals = np.empty((len(states), *self._goals.shape), dtype=np.bool_)
         batch.play_back(self._kitchen, self._rules, actions, states, goals)
         return trajectories_from_states(
             self._packed.layout,
             states,
-            goals if candidate_set == "game" else None,
+            goals[:, player] if candidate_set == "game" else None,
+            player=player,
             participant=participant,
             condition=condition,
             **options,

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from gymnasium import spaces
 
-from legible_envs.errors import LayoutError
-from legible_envs.overcooked.game.goals import missing_station
-from legible_envs.overcooked.game.observations import GRID_CHANNELS, NUM_FEATURES, find_routes
-from legible_envs.overcooked.game.rules import GameRules, count_pots, pack_kitchen, pack_rules
+from legible_envs.overcooked.game.observations import (
+    GRID_CHANNELS,
+    NUM_FEATURES,
+    NUM_OTHER_FEATURES,
+    OTHER_CHANNELS,
+    find_routes,
+)
+from legible_envs.overcooked.game.players import MAX_PLAYERS, check_playable, player_starts
+from legible_envs.overcooked.game.rules import RULE_SETS, count_pots, pack_kitchen, pack_rules
 from legible_envs.overcooked.game.vectors import Kitchen, Vector
-from legible_envs.overcooked.layout import INGREDIENTS, STATION_TYPES, OvercookedLayout, check_shape
+from legible_envs.overcooked.layout import INGREDIENTS, OvercookedLayout, check_shape
 from legible_envs.overcooked.layouts import (
     DEFAULT_SHAPE,
     LayoutDistribution,
@@ -23,11 +29,20 @@ from legible_envs.overcooked.layouts import (
     read_kitchen,
     shape_of,
 )
-from legible_envs.overcooked.recipes import PAPER_SOUPS, check_recipes
+from legible_envs.overcooked.recipes import check_recipes
 from legible_envs.overcooked.rendering.board import RGB_TILE
-from legible_envs.support.validation import choice, is_integer, is_masked, is_real, real, shown, switched_weights
+from legible_envs.support.validation import (
+    choice,
+    integer,
+    is_integer,
+    is_masked,
+    is_real,
+    real,
+    shown,
+    switched_weights,
+)
 
-__all__ = ["NUM_ACTIONS", "OBS_TYPES", "SHAPING", "KitchenSettings", "PackedKitchen", "read_action"]
+__all__ = ["NUM_ACTIONS", "OBS_TYPES", "SHAPING", "KitchenSettings", "PackedKitchen", "read_action", "read_actions"]
 
 NUM_ACTIONS: Final = 6
 
@@ -62,6 +77,8 @@ class KitchenSettings:
         virtual_obstacles: str = "hard",
         crossing_cost: float = 0.0,
         shaping: bool | Mapping[str, float] = False,
+        num_players: int = 1,
+        rules: str = "legible",
     ) -> None:
         asked = None if shape is None else check_shape(shape)
         self.obs_type = choice("obs_type", obs_type, OBS_TYPES)
@@ -71,12 +88,15 @@ class KitchenSettings:
             raise ValueError("give either `layout` (one kitchen) or `layouts` (a distribution), not both")
         takes_own = isinstance(recipes, str) and recipes == "own"
         kitchen = None if layout is None else read_kitchen(layout, asked, orders=takes_own)
-        own = PAPER_SOUPS if kitchen is None else kitchen.recipes or PAPER_SOUPS
-        self.rules = GameRules(
+        rule_set = RULE_SETS[choice("rules", rules, tuple(RULE_SETS))]
+        own = rule_set.recipes if kitchen is None else kitchen.recipes or rule_set.recipes
+        self.rules = replace(
+            rule_set,
             recipes=check_recipes(own if takes_own else recipes),
             cook_time=cook_time,
             soft_obstacles=virtual_obstacles == "soft",
         )
+        self.num_players = integer("num_players", num_players, 1, MAX_PLAYERS, whole_floats=True)
         bonus = switched_weights("shaping", shaping, SHAPING) or dict.fromkeys(SHAPING, 0.0)
         self.weights = np.array([DELIVERY_REWARD, bonus["ingredient"], bonus["dish"], bonus["soup"], -crossing_cost])
         self.distribution: LayoutDistribution | None = None
@@ -109,53 +129,51 @@ class KitchenSettings:
         Raises:
             LayoutError: The recipes cannot be cooked in this kitchen.
         """
-        rules = pack_rules(self.rules, self.shape, 1, count_pots(layout))
-        kitchen = pack_kitchen(layout, rules)
-        self._check_playable(layout, kitchen, rules)
+        rules = pack_rules(self.rules, self.shape, self.num_players, count_pots(layout))
+        starts = player_starts(layout, self.num_players)
+        kitchen = pack_kitchen(layout, rules, starts)
+        check_playable(layout, kitchen, rules, starts)
         if self.obs_type != "vector":
             return PackedKitchen(layout, rules, kitchen, np.empty((0, 2, 0), dtype=np.int16))
         routes = np.empty((7, 2, self.shape[0] * self.shape[1]), dtype=np.int16)
         find_routes(kitchen, rules, routes)
         return PackedKitchen(layout, rules, kitchen, routes)
 
-    @staticmethod
-    def _check_playable(layout: OvercookedLayout, kitchen: Kitchen, rules: Vector) -> None:
-        """Raise an error if the recipes cannot be cooked in this kitchen.
-
-        Raises:
-            LayoutError: A station that the recipes need is absent or cannot be reached from the player's start.
-        """
-        code = missing_station(kitchen, rules, 0)
-        if not code:
-            return
-        kind = STATION_TYPES[code - 3]
-        names = layout.named(kind)
-        if not names:
-            raise LayoutError(
-                f"the kitchen has no {kind} station, which the recipes need; `recipes=` orders others", rule="station"
-            )
-        row, col = layout.stations[names[0]]
-        start = layout.starts[0]
-        raise LayoutError(
-            f"row {row}, column {col}: the {kind} station cannot be reached from the player's start at row {start[0]}, "
-            f"column {start[1]}",
-            rule="reachable",
-            cell=(row, col),
-        )
+    def action_space(self) -> spaces.Discrete[Any] | spaces.MultiDiscrete[Any]:
+        """The space of one environment's actions: those of all players."""
+        if self.num_players == 1:
+            return self.player_action_space()
+        return spaces.MultiDiscrete([NUM_ACTIONS] * self.num_players)
 
     def observation_space(self) -> spaces.Box:
-        """The space of one environment's observations."""
+        """The space of one environment's observations: with several players one behind the other."""
+        space = self.player_observation_space()
+        if self.num_players == 1:
+            return space
+        low, high = (np.repeat(bound[None], self.num_players, axis=0) for bound in (space.low, space.high))
+        return spaces.Box(low, high, dtype=space.dtype.type)  # type: ignore[union-attr]
+
+    @staticmethod
+    def player_action_space() -> spaces.Discrete[Any]:
+        """The space of one player's actions."""
+        return spaces.Discrete(NUM_ACTIONS)
+
+    def player_observation_space(self) -> spaces.Box:
+        """The space of what one player observes."""
         height, width = self.shape
         orders = len(self.rules.recipes)
+        others = self.num_players - 1
         if self.obs_type == "vector":
-            return spaces.Box(-1.0, 1.0, (NUM_FEATURES + orders,), np.float32)
+            return spaces.Box(-1.0, 1.0, (NUM_FEATURES + orders + NUM_OTHER_FEATURES * others,), np.float32)
         if self.obs_type == "rgb":
             return spaces.Box(0, 255, (height * RGB_TILE, width * RGB_TILE, 3), np.uint8)
-        high = np.ones((height, width, len(GRID_CHANNELS) + orders), dtype=np.uint8)
+        channels = len(GRID_CHANNELS) + orders + (len(OTHER_CHANNELS) if others else 0)
+        high = np.ones((height, width, channels), dtype=np.uint8)
         for number, kind in enumerate(INGREDIENTS):
             most = max(recipe.count(kind) for recipe in self.rules.recipes)
             high[..., GRID_CHANNELS.index("tomatoes") + number] = max(most, 1)
-        high[..., GRID_CHANNELS.index("ticks cooked")] = max(min(self.rules.cook_time, 255), 1)
+        longest = 255 if self.rules.overtime else min(self.rules.cook_time, 255)
+        high[..., GRID_CHANNELS.index("ticks cooked")] = max(longest, 1)
         return spaces.Box(np.zeros_like(high), high, dtype=np.uint8)
 
 
@@ -174,3 +192,19 @@ def read_action(action: Any) -> int:
     if (is_integer(number) or (is_real(number) and float(number).is_integer())) and 0 <= number < NUM_ACTIONS:
         return int(number)
     raise ValueError(f"expected an action 0..{NUM_ACTIONS - 1}, got {shown(action)}")
+
+
+def read_actions(actions: Any, num_players: int) -> list[int]:
+    """A joint action as plain integers.
+
+    Args:
+        actions: ``(num_players,)`` integers 0..5, as a list, tuple or array.
+        num_players: How many there must be.
+
+    Raises:
+        ValueError: Anything else.
+    """
+    listed = actions.tolist() if isinstance(actions, np.ndarray) and not is_masked(actions) else actions
+    if not isinstance(listed, list | tuple) or len(listed) != num_players:
+        raise ValueError(f"expected {num_players} actions 0..{NUM_ACTIONS - 1}, one per player, got {shown(actions)}")
+    return [read_action(action) for action in listed]

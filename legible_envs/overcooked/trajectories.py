@@ -169,6 +169,7 @@ def trajectories_from_states(
     states: npt.NDArray[np.int32],
     goals: npt.NDArray[np.bool_] | None,
     *,
+    player: int = 0,
     participant: str = "",
     condition: str = "",
     layout_name: str = "",
@@ -182,6 +183,7 @@ def trajectories_from_states(
         layout: The kitchen.
         states: ``(T, state_size)`` as described in :mod:`legible_envs.overcooked.game.vectors`.
         goals: ``(T, H*W)`` valid goals in each state; the candidates are then those of the game. None: all in reach.
+        player: Number of the player.
         participant: Who played.
         condition: Under which condition.
         layout_name: The kitchen's name, if it has one.
@@ -189,12 +191,13 @@ def trajectories_from_states(
         min_positions: Fewest floor cells of a trajectory.
         min_candidates: Fewest candidates of a trajectory.
     """
-    cells = np.stack(np.divmod(states[:, AT_PLAYERS], layout.shape[1]), axis=-1)
+    at = AT_PLAYERS + 3 * player
+    cells = np.stack(np.divmod(states[:, at], layout.shape[1]), axis=-1)
     return trajectories(
         layout,
         cells[:, None],
-        states[:, AT_PLAYERS + 1, None],
-        states[:, AT_PLAYERS + 2, None],
+        states[:, at + 1, None],
+        states[:, at + 2, None],
         np.arange(len(states)) * seconds_per_tick,
         participants=[participant],
         starts=[_station_beside(layout, cells[0])],

@@ -104,7 +104,8 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
         self.num_envs = integer("num_envs", num_envs, 1, MOST_GAMES, whole_floats=True)
         self.settings = KitchenSettings(**kwargs)
         self.max_episode_steps = read_step_limit(max_episode_steps)
-        self.single_action_space = spaces.Discrete(NUM_ACTIONS)
+        self.num_players = self.settings.num_players
+        self.single_action_space = self.settings.action_space()
         self.single_observation_space = self.settings.observation_space()
         packed = self.settings.pack(self.settings.preview())
         _check_memory(self.num_envs, packed, self.single_observation_space)
@@ -129,13 +130,17 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
             states=np.zeros((count, int(packed.rules[STATE_SIZE])), dtype=np.int32),
             kitchens=np.repeat(packed.kitchen[None], count, axis=0),
             rules=packed.rules,
-            goals=np.zeros((count, cells), dtype=np.bool_),
-            drawn=np.full(count, -1, dtype=np.int32),
+            goals=np.zeros((count, self.num_players, cells), dtype=np.bool_),
+            drawn=np.full((count, self.num_players), -1, dtype=np.int32),
             done=np.zeros(count, dtype=np.bool_),
         )
+        own = self.settings.player_observation_space().shape
+        self._kernel_shape = (count, self.num_players, *own)  # type: ignore[misc]
         self._observations_shape = (count, *self.single_observation_space.shape)  # type: ignore[misc]
-        self._grids = np.zeros(self._observations_shape if self.settings.obs_type == "grid" else 0, dtype=np.uint8)
-        self._goals_shape = (count, *self.settings.shape)
+        self._grids = np.zeros(self._kernel_shape if self.settings.obs_type == "grid" else 0, dtype=np.uint8)
+        players = () if self.num_players == 1 else (self.num_players,)
+        self._goals_shape = (count, *players, *self.settings.shape)
+        self._masks_shape = (count, *players, NUM_ACTIONS)
         self._everyone = np.ones(count, dtype=np.bool_)
 
     # -- the Gymnasium interface --------------------------------------------------------------------------------------
@@ -178,7 +183,7 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
         """Advance all games by one tick.
 
         Args:
-            actions: ``(N,)`` integers 0..5.
+            actions: ``(N,)`` integers 0..5; with several players ``(N, num_players)``.
 
         Returns:
             ``(observations, rewards, terminations, truncations, infos)``, the middle three of shape ``(N,)``.
@@ -196,7 +201,8 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
             games = self._games
         count = self.num_envs
         ends = np.empty((2, count), dtype=np.bool_)
-        outcome = Outcome(np.empty((count, NUM_ACTIONS), dtype=np.int8), np.empty(count), ends[0], ends[1])
+        masks = np.empty((count, self.num_players, NUM_ACTIONS), dtype=np.int8)
+        outcome = Outcome(masks, np.empty(count), ends[0], ends[1])
         limit = self.max_episode_steps or 0
         self._ended = batch.play_all(*games, self.settings.weights, limit, moves, *outcome)
         final: Infos = {}
@@ -229,7 +235,8 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
             index: Number of a game.
 
         Returns:
-            ``(6,)`` for one game, ``(N, 6)`` for all.
+            ``(6,)`` for one game, ``(N, 6)`` for all; with several players ``(num_players, 6)`` and
+            ``(N, num_players, 6)``.
 
         Raises:
             ResetNeeded: Before the first reset.
@@ -237,8 +244,9 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
         if not self._begun:
             raise ResetNeeded("Cannot call envs.action_masks() before calling envs.reset()")
         games, which = self._games, slice(None) if index is None else slice(index, index + 1)
-        masks = np.empty((len(games.states[which]), NUM_ACTIONS), dtype=np.int8)
+        masks = np.empty((len(games.states[which]), self.num_players, NUM_ACTIONS), dtype=np.int8)
         batch.find_all_actions(games.states[which], games.kitchens[which], games.rules, masks)
+        masks = masks.reshape(len(masks), *self._masks_shape[1:])
         return (masks if index is None else masks[0]).astype(np.bool_)
 
     def close_extras(self, **kwargs: Any) -> None:
@@ -270,8 +278,12 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
         return self._games.states[index], self._games.kitchens[index], self._games.rules
 
     def goals(self, index: int) -> tuple[str, ...]:
-        """Names of the valid goals of one game, in reading order; ``call("goals")`` names those of all games."""
-        return name_goals(self._packed[index].layout, self._games.goals[index])
+        """Names of the first player's valid goals in one game, in reading order; ``call("goals")``: in all games."""
+        return self.goals_of(index, 0)
+
+    def goals_of(self, index: int, player: int) -> tuple[str, ...]:
+        """Names of a player's valid goals in one game, in reading order."""
+        return name_goals(self._packed[index].layout, self._games.goals[index, player])
 
     def generator(self, index: int) -> tuple[np.random.Generator, int]:
         """The random generator of one game, and its seed; made now if it has none yet."""
@@ -363,13 +375,15 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
 
     def _read_actions(self, actions: Any) -> npt.NDArray[np.int64]:
         moves = actions if type(actions) is np.ndarray else as_array(actions)
-        if moves.shape != (self.num_envs,) or moves.dtype.kind not in "iu":
+        if moves.shape != self.action_space.shape or moves.dtype.kind not in "iu":
+            expected = self.num_envs if self.num_players == 1 else self.action_space.shape
             raise ValueError(
-                f"expected {self.num_envs} integer actions, got shape {moves.shape} of {moves.dtype}: {shown(actions)}"
+                f"expected {expected} integer actions, got shape {moves.shape} of {moves.dtype}: {shown(actions)}"
             )
-        if not batch.all_within(moves, NUM_ACTIONS):
-            raise ValueError(f"expected actions 0..{NUM_ACTIONS - 1}, got {shown(moves)}")
-        return moves.astype(np.int64).reshape(-1, 1)
+        moves = moves.reshape(self.num_envs, self.num_players)
+        if not batch.all_within(moves.ravel(), NUM_ACTIONS):
+            raise ValueError(f"expected actions 0..{NUM_ACTIONS - 1}, got {shown(actions)}")
+        return moves.astype(np.int64)
 
     def _check_begun(self) -> None:
         if not self._begun:
@@ -405,7 +419,7 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
         if num_pots <= self._num_pots:
             return
         self._num_pots = num_pots
-        rules = pack_rules(self.settings.rules, self.settings.shape, 1, num_pots)
+        rules = pack_rules(self.settings.rules, self.settings.shape, self.num_players, num_pots)
         before = self._games.states
         states = np.full((self.num_envs, int(rules[STATE_SIZE])), -1, dtype=np.int32)
         states[:, : before.shape[1]] = before
@@ -414,12 +428,12 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
     def _restart(self, which: npt.NDArray[np.bool_], masks: npt.NDArray[np.int8] | None = None) -> npt.NDArray[np.int8]:
         """Start new episodes in some games; returns the action masks with theirs written."""
         if masks is None:
-            masks = np.zeros((self.num_envs, NUM_ACTIONS), dtype=np.int8)
+            masks = np.zeros((self.num_envs, self.num_players, NUM_ACTIONS), dtype=np.int8)
         for i in np.flatnonzero(which):
             self._enter_next(int(i))
             games = self._games
             batch.begin(games.states[i], games.kitchens[i], games.rules, games.goals[i], masks[i])
-        self._games.drawn[which] = -1
+        self._games.drawn[which, 0] = -1
         self._games.done[which] = False
         self._ended = int(np.count_nonzero(self._games.done))
         return masks
@@ -428,12 +442,15 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
         games, obs_type = self._games, self.settings.obs_type
         if obs_type == "grid":
             batch.refresh_grids(games.states, games.kitchens, games.rules, games.drawn, self._grids)
-            return self._grids.copy()
+            return self._grids.copy().reshape(self._observations_shape)
         if obs_type == "vector":
-            features = np.zeros(self._observations_shape, dtype=np.float32)
+            features = np.zeros(self._kernel_shape, dtype=np.float32)
             batch.vector_observations(games.states, games.kitchens, games.rules, self._routes, features)
-            return features
-        return np.stack([draw_small(self.view(i)) for i in range(self.num_envs)])
+            return features.reshape(self._observations_shape)
+        pictures = np.stack([draw_small(self.view(i)) for i in range(self.num_envs)])
+        if self.num_players == 1:
+            return pictures
+        return np.repeat(pictures[:, None], self.num_players, axis=1)
 
     def _infos(self, masks: npt.NDArray[np.int8], which: npt.NDArray[np.bool_] | None = None) -> Infos:
         """The games' infos as ``SyncVectorEnv`` gathers them; zeros in games that have none."""
@@ -441,7 +458,7 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
         done = states[:, DELIVERIES].astype(np.int64)
         infos: Infos = {
             "goal_mask": self._games.goals.copy().reshape(self._goals_shape),
-            "action_mask": masks,
+            "action_mask": masks.reshape(self._masks_shape),
             "layout_id": self._ids.copy(),
             "num_done": done,
             "deliveries": done.copy(),

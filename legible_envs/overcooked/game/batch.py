@@ -1,4 +1,7 @@
-"""Kernels over many games at once: one row of ``states`` (and of ``kitchens``) per game; see ``vectors``."""
+"""Kernels over whole games and many games at once: one row of ``states`` and ``kitchens`` per game; see ``vectors``.
+
+``P`` is the number of players.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,7 @@ import numpy.typing as npt
 from legible_envs.overcooked.game.dynamics import is_over, start, step
 from legible_envs.overcooked.game.goals import find_actions, find_goals
 from legible_envs.overcooked.game.observations import grid_observation, redraw_motion, vector_observation
-from legible_envs.overcooked.game.vectors import AT_PLAYERS, STEPS, Kitchen, Vector
+from legible_envs.overcooked.game.vectors import AT_PLAYERS, NUM_PLAYERS, STEPS, Kitchen, Vector
 from legible_envs.support.compiled import kernel
 
 Vectors = npt.NDArray[np.int32]
@@ -41,20 +44,21 @@ def step_all(
 
 @kernel
 def begin(
-    state: Vector, kitchen: Kitchen, rules: Vector, goals: npt.NDArray[np.bool_], mask: npt.NDArray[np.int8]
+    state: Vector, kitchen: Kitchen, rules: Vector, goals: npt.NDArray[np.bool_], masks: npt.NDArray[np.int8]
 ) -> None:
-    """Start one single-player game and say what may be reached for and done first.
+    """Start one game and say what each player may reach for and do first.
 
     Args:
         state: ``(state_size,)``, written.
         kitchen: See ``vectors``.
         rules: See ``vectors``.
-        goals: ``(H*W,)``, written.
-        mask: ``(6,)``, written.
+        goals: ``(P, H*W)``, written.
+        masks: ``(P, 6)``, written.
     """
     start(state, kitchen, rules)
-    find_goals(state, kitchen, rules, 0, goals)
-    find_actions(state, kitchen, rules, 0, mask)
+    for player in range(rules[NUM_PLAYERS]):
+        find_goals(state, kitchen, rules, player, goals[player])
+        find_actions(state, kitchen, rules, player, masks[player])
 
 
 @kernel
@@ -65,36 +69,37 @@ def play(
     weights: npt.NDArray[np.float64],
     actions: npt.NDArray[np.int64],
     goals: npt.NDArray[np.bool_],
-    mask: npt.NDArray[np.int8],
+    masks: npt.NDArray[np.int8],
 ) -> tuple[float, bool, bool]:
-    """Advance one single-player game by one tick; returns ``(reward, over, changed)``.
+    """Advance one game by one tick; returns ``(reward, over, changed)``.
 
     Args:
         state: ``(state_size,)``, changed in place.
         kitchen: See ``vectors``.
         rules: See ``vectors``.
         weights: ``(5,)`` rewards; see :func:`~legible_envs.overcooked.game.dynamics.step`.
-        actions: ``(1,)`` action.
-        goals: ``(H*W,)`` goals after the tick before, brought up to date.
-        mask: ``(6,)``, written.
+        actions: ``(P,)`` actions.
+        goals: ``(P, H*W)`` goals after the tick before, brought up to date.
+        masks: ``(P, 6)``, written.
     """
     reward, changed = step(state, kitchen, rules, weights, actions)
-    if changed:
-        find_goals(state, kitchen, rules, 0, goals)
-    find_actions(state, kitchen, rules, 0, mask)
+    for player in range(rules[NUM_PLAYERS]):
+        if changed:
+            find_goals(state, kitchen, rules, player, goals[player])
+        find_actions(state, kitchen, rules, player, masks[player])
     return reward, is_over(state, rules), changed
 
 
 class Batch(NamedTuple):
-    """``N`` single-player games under one set of rules, one row each; kernels change all but kitchens and rules.
+    """``N`` games under one set of rules, one row each; kernels change all but kitchens and rules.
 
     Attributes:
         states: ``(N, state_size)``; see ``vectors``.
         kitchens: ``(N, kitchen size)``.
         rules: One vector for all.
-        goals: ``(N, H*W)`` valid goals after the last tick.
-        drawn: ``(N,)`` cell of the player in the last grid observation where nothing has happened since but moves and
-            cooking; -1 where the whole grid has to be drawn anew.
+        goals: ``(N, P, H*W)`` valid goals of each player after the last tick.
+        drawn: ``(N, P)`` cells of the players in the last grid observations where nothing has happened since but moves
+            and cooking; -1 where the whole grids have to be drawn anew.
         done: ``(N,)`` whether the last tick ended the game; the next one then starts it anew instead.
     """
 
@@ -102,7 +107,7 @@ class Batch(NamedTuple):
     kitchens: npt.NDArray[np.int16]
     rules: Vector
     goals: npt.NDArray[np.bool_]
-    drawn: Vector
+    drawn: npt.NDArray[np.int32]
     done: npt.NDArray[np.bool_]
 
 
@@ -110,7 +115,7 @@ class Outcome(NamedTuple):
     """What a tick of ``N`` games hands back; arrays for kernels to write.
 
     Attributes:
-        masks: ``(N, 6)`` actions that do something.
+        masks: ``(N, P, 6)`` actions that do something.
         rewards: ``(N,)``.
         terminated: ``(N,)``.
         truncated: ``(N,)``.
@@ -128,7 +133,7 @@ def play_all(
     kitchens: npt.NDArray[np.int16],
     rules: Vector,
     goals: npt.NDArray[np.bool_],
-    drawn: Vector,
+    drawn: npt.NDArray[np.int32],
     done: npt.NDArray[np.bool_],
     weights: npt.NDArray[np.float64],
     limit: int,
@@ -138,7 +143,7 @@ def play_all(
     terminated: npt.NDArray[np.bool_],
     truncated: npt.NDArray[np.bool_],
 ) -> int:
-    """Advance ``N`` single-player games by one tick, or start them anew; returns how many ended.
+    """Advance ``N`` games by one tick, or start them anew; returns how many ended.
 
     Called as ``play_all(*games, weights, limit, actions, *outcome)`` with a :class:`Batch` and an :class:`Outcome`:
     the compiler's wrapper takes 2 microseconds longer to look into a named tuple, a twentieth of a tick of 64 games.
@@ -152,7 +157,7 @@ def play_all(
         done: Whether to start the game anew instead; then whether it ended.
         weights: ``(5,)`` rewards; see :func:`~legible_envs.overcooked.game.dynamics.step`.
         limit: Steps after which a game is truncated; 0 means never.
-        actions: ``(N, 1)`` actions; ignored where a game starts anew.
+        actions: ``(N, P)`` actions; ignored where a game starts anew.
         masks: See :class:`Outcome`, as the next three; written.
         rewards: Written.
         terminated: Written.
@@ -164,11 +169,11 @@ def play_all(
             begin(states[i], kitchens[i], rules, goals[i], masks[i])
             rewards[i] = 0.0
             terminated[i] = truncated[i] = done[i] = False
-            drawn[i] = -1
+            drawn[i, 0] = -1
             continue
         rewards[i], over, changed = play(states[i], kitchens[i], rules, weights, actions[i], goals[i], masks[i])
         if changed:
-            drawn[i] = -1
+            drawn[i, 0] = -1
         terminated[i] = over
         truncated[i] = 0 < limit <= states[i, STEPS]
         done[i] = terminated[i] or truncated[i]
@@ -185,35 +190,41 @@ def play_back(
     states: Vectors,
     goals: npt.NDArray[np.bool_],
 ) -> None:
-    """Write all states of a single-player game, and the valid goals in each, from its actions.
+    """Write all states of a game, and the valid goals in each, from its actions.
 
     Args:
         kitchen: See ``vectors``.
         rules: See ``vectors``.
-        actions: ``(T, 1)``.
+        actions: ``(T, P)``.
         states: ``(T + 1, state_size)``, written.
-        goals: ``(T + 1, H*W)``, written.
+        goals: ``(T + 1, P, H*W)``, written.
     """
-    weights, mask = np.zeros(5), np.empty(6, dtype=np.int8)
-    begin(states[0], kitchen, rules, goals[0], mask)
+    weights, masks = np.zeros(5), np.empty((rules[NUM_PLAYERS], 6), dtype=np.int8)
+    begin(states[0], kitchen, rules, goals[0], masks)
     for t in range(len(actions)):
         states[t + 1] = states[t]
         goals[t + 1] = goals[t]
-        play(states[t + 1], kitchen, rules, weights, actions[t], goals[t + 1], mask)
+        play(states[t + 1], kitchen, rules, weights, actions[t], goals[t + 1], masks)
 
 
 @kernel
 def refresh_grids(
-    states: Vectors, kitchens: npt.NDArray[np.int16], rules: Vector, drawn: Vector, grids: npt.NDArray[np.uint8]
+    states: Vectors,
+    kitchens: npt.NDArray[np.int16],
+    rules: Vector,
+    drawn: npt.NDArray[np.int32],
+    grids: npt.NDArray[np.uint8],
 ) -> None:
-    """Bring the ``(N, H, W, C)`` grid observations of one tick ago up to date; see :class:`Batch` for the others."""
+    """Bring the ``(N, P, H, W, C)`` grid observations of one tick ago up to date; see :class:`Batch` for the others."""
     for i in range(states.shape[0]):
-        if drawn[i] < 0:
-            grids[i] = 0
-            grid_observation(states[i], kitchens[i], rules, grids[i])
-        else:
-            redraw_motion(states[i], rules, drawn[i], grids[i])
-        drawn[i] = states[i, AT_PLAYERS]
+        for player in range(rules[NUM_PLAYERS]):
+            if drawn[i, 0] < 0:
+                grids[i, player] = 0
+                grid_observation(states[i], kitchens[i], rules, player, grids[i, player])
+            else:
+                redraw_motion(states[i], rules, player, drawn[i], grids[i, player])
+        for player in range(rules[NUM_PLAYERS]):
+            drawn[i, player] = states[i, AT_PLAYERS + 3 * player]
 
 
 @kernel
@@ -224,18 +235,20 @@ def vector_observations(
     routes: npt.NDArray[np.int16],
     out: npt.NDArray[np.float32],
 ) -> None:
-    """Write the ``(N, D)`` vector observations of ``N`` games; ``routes`` ``(N, 7, 2, H*W)``, ``out`` zeros."""
+    """Write the ``(N, P, D)`` vector observations of ``N`` games; ``routes`` ``(N, 7, 2, H*W)``, ``out`` zeros."""
     for i in range(states.shape[0]):
-        vector_observation(states[i], kitchens[i], rules, routes[i], out[i])
+        for player in range(rules[NUM_PLAYERS]):
+            vector_observation(states[i], kitchens[i], rules, routes[i], player, out[i, player])
 
 
 @kernel
 def find_all_actions(
     states: Vectors, kitchens: npt.NDArray[np.int16], rules: Vector, masks: npt.NDArray[np.int8]
 ) -> None:
-    """Write the ``(N, 6)`` masks of actions that do something in ``N`` games."""
+    """Write the ``(N, P, 6)`` masks of actions that do something in ``N`` games."""
     for i in range(states.shape[0]):
-        find_actions(states[i], kitchens[i], rules, 0, masks[i])
+        for player in range(rules[NUM_PLAYERS]):
+            find_actions(states[i], kitchens[i], rules, player, masks[i, player])
 
 
 @kernel

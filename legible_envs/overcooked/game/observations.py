@@ -31,7 +31,16 @@ from legible_envs.overcooked.grid_kernels import neighbour
 from legible_envs.overcooked.layout import COUNTER
 from legible_envs.support.compiled import kernel
 
-__all__ = ["GRID_CHANNELS", "NUM_FEATURES", "find_routes", "grid_observation", "redraw_motion", "vector_observation"]
+__all__ = [
+    "GRID_CHANNELS",
+    "NUM_FEATURES",
+    "NUM_OTHER_FEATURES",
+    "OTHER_CHANNELS",
+    "find_routes",
+    "grid_observation",
+    "redraw_motion",
+    "vector_observation",
+]
 
 GRID_CHANNELS: Final = (
     *("counter", "obstacle", "tomato station", "onion station", "cabbage station", "fish station", "dish station"),
@@ -48,8 +57,14 @@ TICKS: Final = 20
 READY: Final = 21
 ORDERS: Final = 22
 
+OTHER_CHANNELS: Final = ("other player", "other facing N", "other facing S", "other facing E", "other facing W")
+"""Names of the channels that follow the recipes' where there are several players."""
+
 NUM_FEATURES: Final = 51
 """Length of a vector observation without the orders, one entry per recipe, that follow."""
+
+NUM_OTHER_FEATURES: Final = 13
+"""Entries that follow the orders for each other player."""
 
 Grid = npt.NDArray[np.uint8]
 
@@ -70,14 +85,15 @@ def _draw_item(item: int, rules: Vector, grid: Grid, row: int, col: int) -> None
 
 
 @kernel
-def grid_observation(state: Vector, kitchen: Kitchen, rules: Vector, grid: Grid) -> None:
+def grid_observation(state: Vector, kitchen: Kitchen, rules: Vector, observer: int, grid: Grid) -> None:
     """Write a grid observation; channels as in ``GRID_CHANNELS``, then one per recipe: 1 until it is delivered.
 
     Args:
         state: See ``vectors``.
         kitchen: See ``vectors``.
         rules: See ``vectors``.
-        grid: ``(H, W, 22 + recipes)``, zeros, written.
+        observer: Number of the player who observes; where there are others, ``OTHER_CHANNELS`` come last.
+        grid: ``(H, W, 22 + recipes)``, with several players ``(H, W, 27 + recipes)``; zeros, written.
     """
     width = rules[WIDTH]
     orders = rules[NUM_ORDERS]
@@ -91,7 +107,7 @@ def grid_observation(state: Vector, kitchen: Kitchen, rules: Vector, grid: Grid)
                     _draw_item(state[rules[AT_ITEMS] + cell], rules, grid, row, col)
             for order in range(orders):
                 grid[row, col, ORDERS + order] = 1 if state[rules[AT_ORDERS] + order] != 2 else 0
-    _draw_motion(state, rules, grid)
+    _draw_motion(state, rules, observer, grid)
     for number in range(rules[NUM_POTS]):
         pot = rules[AT_POTS] + POT_RECORD * number
         for kind in range(4):
@@ -100,14 +116,15 @@ def grid_observation(state: Vector, kitchen: Kitchen, rules: Vector, grid: Grid)
 
 
 @kernel
-def _draw_motion(state: Vector, rules: Vector, grid: Grid) -> None:
+def _draw_motion(state: Vector, rules: Vector, observer: int, grid: Grid) -> None:
     """Mark what changes without anything being used: players with what they hold, and pots that cook."""
     width = rules[WIDTH]
     for player in range(rules[NUM_PLAYERS]):
         at = AT_PLAYERS + 3 * player
         row, col = state[at] // width, state[at] % width
-        grid[row, col, PLAYER] = 1
-        grid[row, col, PLAYER + 1 + state[at + 1]] = 1
+        channel = PLAYER if player == observer else ORDERS + rules[NUM_ORDERS]
+        grid[row, col, channel] = 1
+        grid[row, col, channel + 1 + state[at + 1]] = 1
         _draw_item(state[at + 2], rules, grid, row, col)
     for number in range(rules[NUM_POTS]):
         pot = rules[AT_POTS] + POT_RECORD * number
@@ -118,19 +135,23 @@ def _draw_motion(state: Vector, rules: Vector, grid: Grid) -> None:
 
 
 @kernel
-def redraw_motion(state: Vector, rules: Vector, before: int, grid: Grid) -> None:
-    """Bring a single-player grid observation up to date after a tick in which nothing was used.
+def redraw_motion(state: Vector, rules: Vector, observer: int, before: Vector, grid: Grid) -> None:
+    """Bring a grid observation up to date after a tick in which nothing was used.
 
     Args:
         state: See ``vectors``.
         rules: See ``vectors``.
-        before: Flat cell where the player was one tick ago.
+        observer: Number of the player who observes.
+        before: ``(players,)`` flat cells where the players were one tick ago.
         grid: The observation one tick ago, written.
     """
-    row, col = before // rules[WIDTH], before % rules[WIDTH]
-    # Only players stand on such a cell, so that all its items are theirs.
-    grid[row, col, PLAYER:TICKS] = 0
-    _draw_motion(state, rules, grid)
+    others = ORDERS + rules[NUM_ORDERS]
+    for player in range(before.shape[0]):
+        row, col = before[player] // rules[WIDTH], before[player] % rules[WIDTH]
+        # Only players stand on such a cell, so that all its items are theirs.
+        grid[row, col, PLAYER:TICKS] = 0
+        grid[row, col, others:] = 0
+    _draw_motion(state, rules, observer, grid)
 
 
 @kernel
@@ -172,16 +193,22 @@ def find_routes(kitchen: Kitchen, rules: Vector, routes: npt.NDArray[np.int16]) 
 
 @kernel
 def _describe_player(
-    state: Vector, kitchen: Kitchen, rules: Vector, routes: npt.NDArray[np.int16], out: npt.NDArray[np.float32]
+    state: Vector,
+    kitchen: Kitchen,
+    rules: Vector,
+    routes: npt.NDArray[np.int16],
+    observer: int,
+    out: npt.NDArray[np.float32],
 ) -> None:
     """Entries 0 to 37: where the player is, what they hold, where they can go, and how far the stations are."""
     height, width = rules[HEIGHT], rules[WIDTH]
-    cell = state[AT_PLAYERS]
+    at_observer = AT_PLAYERS + 3 * observer
+    cell = state[at_observer]
     row, col = cell // width, cell % width
     out[0] = row / (height - 1)
     out[1] = col / (width - 1)
-    out[2 + state[AT_PLAYERS + 1]] = 1.0
-    out[6 + min(state[AT_PLAYERS + 2], SOUP)] = 1.0
+    out[2 + state[at_observer + 1]] = 1.0
+    out[6 + min(state[at_observer + 2], SOUP)] = 1.0
     for direction in range(4):
         target = neighbour(cell, direction, rules[HEIGHT], rules[WIDTH])
         if target >= 0 and walkable(kitchen[target], rules):
@@ -198,8 +225,27 @@ def _describe_player(
 
 
 @kernel
+def _describe_others(state: Vector, rules: Vector, observer: int, out: npt.NDArray[np.float32]) -> None:
+    """The last entries: where the other players are, seen from this one, which way they face and what they hold."""
+    height, width, players = rules[HEIGHT], rules[WIDTH], rules[NUM_PLAYERS]
+    cell = state[AT_PLAYERS + 3 * observer]
+    for number in range(1, players):
+        at = AT_PLAYERS + 3 * ((observer + number) % players)
+        first = NUM_FEATURES + rules[NUM_ORDERS] + NUM_OTHER_FEATURES * (number - 1)
+        out[first] = (state[at] // width - cell // width) / (height - 1)
+        out[first + 1] = (state[at] % width - cell % width) / (width - 1)
+        out[first + 2 + state[at + 1]] = 1.0
+        out[first + 6 + min(state[at + 2], SOUP)] = 1.0
+
+
+@kernel
 def vector_observation(
-    state: Vector, kitchen: Kitchen, rules: Vector, routes: npt.NDArray[np.int16], out: npt.NDArray[np.float32]
+    state: Vector,
+    kitchen: Kitchen,
+    rules: Vector,
+    routes: npt.NDArray[np.int16],
+    observer: int,
+    out: npt.NDArray[np.float32],
 ) -> None:
     """Write a vector observation; its entries are listed in the environment's documentation.
 
@@ -208,9 +254,11 @@ def vector_observation(
         kitchen: See ``vectors``.
         rules: See ``vectors``.
         routes: Made by :func:`find_routes`.
-        out: ``(51 + recipes,)``, zeros, written.
+        observer: Number of the player who observes.
+        out: ``(51 + recipes + 13 * other players,)``, zeros, written.
     """
-    _describe_player(state, kitchen, rules, routes, out)
+    _describe_player(state, kitchen, rules, routes, observer, out)
+    _describe_others(state, rules, observer, out)
     largest = 1
     for order in range(rules[NUM_ORDERS]):
         size = 0
