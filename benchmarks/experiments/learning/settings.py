@@ -138,9 +138,11 @@ class TrainingSettings(FileModel):
         data = self.to_dict()
         for path, value in changes.items():
             *parents, name = path.split(".")
-            place = data
+            place: Any = data
             for parent in parents:
-                place = place[parent]
+                place = place.get(parent) if isinstance(place, dict) else None
+            if not isinstance(place, dict):
+                raise ValueError(f"there is no setting {shown(path)}; there are {', '.join(data)}, and those in them")
             if value is None:
                 place.pop(name, None)
             else:
