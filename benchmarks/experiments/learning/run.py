@@ -99,7 +99,7 @@ def _play(where: str, environment: Environment, players: Mapping[str, Any], epis
 
     try:
         played = {name: evaluate_policy(policy, environment, episodes, 1) for name, policy in players.items()}
-        if "Overcooked" in environment.id:
+        if "Overcooked" in environment.id and environment.arguments.get("num_players", 1) == 1:
             played["scripted"] = evaluate_scripted(environment, episodes, 1)
     except LayoutError:
         return []

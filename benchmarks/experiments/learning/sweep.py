@@ -38,14 +38,15 @@ class Task:
 
 TASKS: Final[Mapping[str, Task]] = {
     "5x5, one onion": Task("overcooked", {"shape": [5, 5], "recipes": _ONION}, 200_000, 100_000),
-    "7x7, three soups": Task("overcooked", {}, 2_000_000, 100_000),
-    "7x7, three soups, grids": Task("overcooked", {"obs_type": "grid"}, 2_000_000, 20_000),
+    "7x7, three soups": Task("overcooked", {}, 500_000, 100_000),
+    "7x7, three soups, two cooks": Task("overcooked", {"num_players": 2}, 500_000, 50_000),
+    "7x7, three soups, grids": Task("overcooked", {"obs_type": "grid"}, 500_000, 20_000),
     "random kitchens, one onion": Task(
-        "overcooked", {"recipes": _ONION, "layouts": "random:train"}, 3_000_000, 100_000, elsewhere=True
+        "overcooked", {"recipes": _ONION, "layouts": "random:train"}, 2_000_000, 100_000, elsewhere=True
     ),
     "table": Task("tabletop", {}, 1_000_000, 20_000),
 }
-"""By name. One cook each."""
+"""By name. One network plays both of two cooks."""
 
 
 @dataclass(frozen=True)
