@@ -55,6 +55,10 @@ class PlayerSpace(FileModel):
         if isinstance(done, spaces.Discrete):
             actions, size = "discrete", int(done.n)
         elif isinstance(done, spaces.Box) and len(done.shape) == 1:
+            if (done.low != -1).any() or (done.high != 1).any():
+                raise ValueError(
+                    f"expected numbers from -1 to 1 as actions, got {done}; gymnasium's RescaleAction helps"
+                )
             actions, size = "continuous", int(done.shape[0])
         elif isinstance(done, spaces.MultiDiscrete) and len(done.nvec) == shape[0] and len({*done.nvec.tolist()}) == 1:
             actions, size, players, shape = "discrete", int(done.nvec[0]), len(done.nvec), shape[1:]

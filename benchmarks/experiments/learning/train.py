@@ -78,11 +78,11 @@ def train(
         most_updates: Stop early, as an interruption would, after so many updates.
 
     Returns:
-        The newest checkpoint.
+        The newest checkpoint, on disk too.
 
     Raises:
         CheckpointError: There is a run already and ``resume`` is off; or it was begun with other settings, is damaged,
-            or of another space.
+            or of another space; or the training was stopped before its first checkpoint.
         ImportError: PyTorch is not installed.
         ValueError: Settings that fit no environment.
     """
@@ -143,7 +143,8 @@ class _Run:
                 writer.close()
         if begun < self.updates:
             self._write_speed(self.updates - begun)
-        assert self.checkpoint is not None
+        if self.checkpoint is None:
+            raise CheckpointError(f"the training in {self.folder} was stopped before its first checkpoint")
         return self.checkpoint
 
     def _go_to_checkpoint(self, last: int, progress: Callable[[Moment], object], writer: Any) -> None:

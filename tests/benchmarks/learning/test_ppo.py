@@ -249,12 +249,13 @@ def test_only_kitchens_have_guides() -> None:
     [
         (spaces.Dict({}), r"expected observations in a Box"),
         (spaces.Box(0, 1, (2, 2)), r"expected observations of shape"),
+        (spaces.Box(0, 1, (2,)), r"expected numbers from -1 to 1 as actions"),
     ],
 )
 def test_spaces_that_no_network_is_for_are_refused(environment: Any, said: str) -> None:
     class Odd(gym.Env[Any, Any]):
         observation_space = environment
-        action_space = spaces.Discrete(2)
+        action_space = spaces.Box(-2, 2, (1,)) if "numbers" in said else spaces.Discrete(2)
 
     envs = gym.vector.SyncVectorEnv([Odd])
     with pytest.raises(ValueError, match=said):

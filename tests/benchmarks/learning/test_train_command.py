@@ -129,7 +129,9 @@ def test_two_cooks_are_played_by_one_network(tmp_path: Path) -> None:
 def test_a_layout_of_a_file_is_what_is_played(tmp_path: Path) -> None:
     drawing = "XPXXX\nO   S\nX   X\nX  1D\nXXXXX\n"
     (tmp_path / "k.txt").write_text(drawing)
-    result = legible("train", "overcooked", *SMALL[3:], "--layout", tmp_path / "k.txt", "--steps", 64, "--out", tmp_path / "run")
+    result = legible(
+        "train", "overcooked", *SMALL[3:], "--layout", tmp_path / "k.txt", "--steps", 64, "--out", tmp_path / "run"
+    )
     assert result.exit_code == 0, result.output
     settings = TrainingSettings.from_dict(json.loads((tmp_path / "run" / "settings.json").read_text()))
     assert settings.environment.arguments["layout"].split() == drawing.split()
