@@ -23,12 +23,13 @@ Floats = npt.NDArray[np.float64]
 
 
 class Guide:
-    """Tells of every step of a cook whether it led nearer to a valid goal: 1, farther: -1, or neither: 0.
+    """Tells of every step of a cook how many moves it led nearer to what they need next.
 
-    A cook is as many moves away as from the nearest of their valid goals (``info["goal_mask"]``), ``H + W`` more if
-    their hands are empty, and twice as many more if they hold what is of no use now and must be put away. A step that
-    is rewarded, as one that puts an ingredient in a pot is with ``shaping``, has led nearer. Nothing is looked up in
-    the game: the goals are in infos, the cook's cell and hands in observations.
+    A cook is as far away as from the nearest of their valid goals (``info["goal_mask"]``), at most ``reach`` moves;
+    ``reach`` more if their hands are empty, and twice ``reach`` more if they hold what is of no use now and must be put
+    away. To and fro is nothing: differences of a function of the state sum to 0 on every way back. A step that is
+    rewarded, as one that puts an ingredient in a pot is with ``shaping``, counts 1. Nothing is looked up in the game: the
+    goals are in infos, the cook's cell and hands in observations.
 
     It is no reward. A reward of this kind (a potential, Ng, Harada and Russell 1999) is soon expected by the critic,
     and then guides no more where no other reward was found yet. It is added to advantages, see :func:`.collect`, with
@@ -49,6 +50,7 @@ class Guide:
             raise ValueError("`ppo.guide` is for kitchens seen as grids or vectors; expected 0 for others")
         self.envs, self.space = envs, space
         self.height, self.width = envs.shape
+        self.reach = (self.height + self.width) // 2
         cells = self.height * self.width
         self._moves = np.zeros((envs.num_envs, cells, cells), dtype=np.int16)
         self._takers = np.zeros((envs.num_envs, cells), dtype=np.bool_)
@@ -61,7 +63,7 @@ class Guide:
         self._before = self._away(obs, infos["goal_mask"], np.arange(len(self._ids)))
 
     def nearer(self, obs: npt.NDArray[Any], rewards: npt.NDArray[Any], infos: Mapping[str, Any]) -> Floats:
-        """``(N, players)`` 1, -1 or 0 for a step; arguments are what the step returned."""
+        """``(N, players)`` moves, less than 0 for a step away; arguments are what the step returned."""
         everyone = np.arange(len(self._ids))
         ended = np.flatnonzero(infos["_final_obs"]) if "_final_obs" in infos else np.empty(0, dtype=np.intp)
         reached = None
@@ -74,7 +76,7 @@ class Guide:
         if reached is not None:
             gained[ended] = self._before[ended] - reached
         self._before = after
-        return np.where(rewards[:, None] > 0, 1.0, np.sign(gained))
+        return np.where(rewards[:, None] > 0, 1.0, gained)
 
     def _enter(self, layout_ids: npt.NDArray[np.int64]) -> None:
         """Work out the moves of kitchens that are new."""
@@ -98,8 +100,8 @@ class Guide:
         nearest = np.where(marked, away, cells).min(axis=2)
         # What is held is of use where a pot or the serving station takes it, and these take nothing else.
         useful = (marked & self._takers[which, None]).any(axis=2)
-        behind = np.where(useful, 0, np.where(empty, 1, 2)) * (self.height + self.width)
-        return np.where(marked.any(axis=2), nearest + behind, 0).astype(np.float64)
+        behind = np.where(useful, 0, np.where(empty, 1, 2)) * self.reach
+        return np.where(marked.any(axis=2), np.minimum(nearest, self.reach) + behind, 0).astype(np.float64)
 
     def _cells_and_hands(self, rows: npt.NDArray[Any]) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.bool_]]:
         """``(B,)`` the cells that cooks stand in, and whether their hands are empty."""
