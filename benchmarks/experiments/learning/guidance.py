@@ -28,8 +28,8 @@ class Guide:
     A cook is as far away as from the nearest of their valid goals (``info["goal_mask"]``), at most ``reach`` moves;
     ``reach`` more if their hands are empty, and twice ``reach`` more if they hold what is of no use now and must be put
     away. To and fro is nothing: differences of a function of the state sum to 0 on every way back. A step that is
-    rewarded, as one that puts an ingredient in a pot is with ``shaping``, counts 1. Nothing is looked up in the game: the
-    goals are in infos, the cook's cell and hands in observations.
+    rewarded, as one that puts an ingredient in a pot is with ``shaping``, counts 1. Nothing is looked up in the game:
+    the goals are in infos, the cook's cell and hands in observations.
 
     It is no reward. A reward of this kind (a potential, Ng, Harada and Russell 1999) is soon expected by the critic,
     and then guides no more where no other reward was found yet. It is added to advantages, see :func:`.collect`, with
