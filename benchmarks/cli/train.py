@@ -39,7 +39,7 @@ _EPISODES: Final = 64
               help="Kitchens: an ordered soup by its ingredients; repeatable. [default: three]")  # fmt: skip
 @click.option("--obs", type=click.Choice(["vector", "grid"]), help="Kitchens: what a cook sees. [default: vector]")
 @click.option("--num-players", type=click.IntRange(1, 4), help="Kitchens: cooks, all played by one network.")
-@click.option("--steps", type=click.IntRange(1, 10**12), help="Of all games. [default: 500000; tables 1000000]")
+@click.option("--steps", type=click.IntRange(1, 10**12), help="Of all games. [default: 1000000]")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 @click.option("--set", "assigned", multiple=True, type=Assignment(), metavar="NAME=VALUE",
               help="Another setting, such as ppo.entropy=0.02 or environment.arguments.cook_time=10; "

@@ -46,7 +46,7 @@ def recipe(domain: str, arguments: Mapping[str, Any]) -> TrainingSettings:
             environment=Environment(id=DOMAINS[domain], arguments=kitchen),
             network=network,
             ppo=_KITCHEN,
-            steps=500_000,
+            steps=1_000_000,
         )
     if domain == "tabletop":
         table = {"max_speed": 0.5, "shaping": {"discount": _TABLE.gamma}, **arguments}

@@ -38,9 +38,9 @@ class Task:
 
 TASKS: Final[Mapping[str, Task]] = {
     "5x5, one onion": Task("overcooked", {"shape": [5, 5], "recipes": _ONION}, 200_000, 100_000),
-    "7x7, three soups": Task("overcooked", {}, 500_000, 100_000),
-    "7x7, three soups, two cooks": Task("overcooked", {"num_players": 2}, 500_000, 50_000),
-    "7x7, three soups, grids": Task("overcooked", {"obs_type": "grid"}, 500_000, 20_000),
+    "7x7, three soups": Task("overcooked", {}, 1_000_000, 100_000),
+    "7x7, three soups, two cooks": Task("overcooked", {"num_players": 2}, 1_000_000, 50_000),
+    "7x7, three soups, grids": Task("overcooked", {"obs_type": "grid"}, 1_000_000, 20_000),
     "random kitchens, one onion": Task(
         "overcooked", {"recipes": _ONION, "layouts": "random:train"}, 2_000_000, 100_000, elsewhere=True
     ),
