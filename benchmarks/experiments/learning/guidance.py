@@ -50,7 +50,7 @@ class Guide:
             raise ValueError("`ppo.guide` is for kitchens seen as grids or vectors; expected 0 for others")
         self.envs, self.space = envs, space
         self.height, self.width = envs.shape
-        self.reach = cells  # farther than any goal
+        self.reach = self.height * self.width  # farther than any goal
         cells = self.height * self.width
         self._moves = np.zeros((envs.num_envs, cells, cells), dtype=np.int16)
         self._takers = np.zeros((envs.num_envs, cells), dtype=np.bool_)
