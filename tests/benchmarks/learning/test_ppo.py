@@ -199,7 +199,7 @@ def test_a_guide_says_nearer_and_farther(obs_type: str) -> None:
         (west, 0), (use, 1), (use, -1), (use, 1),  # take it, put it back, take it
         (north, 0), (use, 1),  # in the pot, which is rewarded
         (south, 1), (south, 1), (east, 1), (east, 1), (east, 0), (use, 1),  # the dish
-        (north, 0), (stay, 0),  # wait with it: it is of use
+        (north, 1), (stay, 0),  # to the pot with it; waiting is neither
     ]  # fmt: skip
     for number, (action, wanted) in enumerate(steps):
         obs, rewards, _, _, infos = envs.step(np.array([action, stay]))
