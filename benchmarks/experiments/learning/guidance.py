@@ -19,15 +19,19 @@ __all__ = ["Guide", "moves_between"]
 _HANDS_EMPTY = 6
 """Of a vector observation."""
 
+_IDLE = -0.5
+"""For a step that leads nowhere, such as a turn: less than for one nearer, or nobody would begin to walk."""
+
 Floats = npt.NDArray[np.float64]
 
 
 class Guide:
-    """Tells of every step of a cook whether it led nearer to what they need next: 1, farther: -1, or neither: 0.
+    """Tells of every step of a cook whether it led nearer to what they need next: 1, farther: -1, or neither: -0.5.
 
     A cook is as far away as from the nearest of their valid goals (``info["goal_mask"]``), farther if their hands are
     empty than if they hold what is of use, and farthest while they hold what is of no use now: then every step is one
-    away but the one that puts it down, so that nothing is gained by carrying it about. A step that is rewarded, as one
+    away but the one that puts it down, so that nothing is gained by carrying it about. To wait beside a pot or the
+    serving station, with what belongs there, is 0. A step that is rewarded, as one
     that puts an ingredient in a pot is with ``shaping``, led nearer. Nothing is looked up in the game: the goals are in
     infos, the cook's cell and hands in observations.
 
@@ -63,7 +67,7 @@ class Guide:
         self._before = self._away(obs, infos["goal_mask"], np.arange(len(self._ids)))
 
     def nearer(self, obs: npt.NDArray[Any], rewards: npt.NDArray[Any], infos: Mapping[str, Any]) -> Floats:
-        """``(N, players)`` 1, -1 or 0 for a step; arguments are what the step returned."""
+        """``(N, players)`` from -1 to 1 for a step; arguments are what the step returned."""
         everyone = np.arange(len(self._ids))
         ended = np.flatnonzero(infos["_final_obs"]) if "_final_obs" in infos else np.empty(0, dtype=np.intp)
         reached = None
@@ -75,9 +79,10 @@ class Guide:
         gained = self._before - after
         if reached is not None:
             gained[ended] = self._before[ended] - reached
-        carried = (gained == 0) & (self._before >= 2 * self.reach)
+        # Neither: with what is of use beside where it belongs, a cook may have to wait; elsewhere time is lost.
+        neither = np.select([self._before == 0, self._before >= 2 * self.reach], [0.0, -1.0], _IDLE)
         self._before = after
-        return np.where(rewards[:, None] > 0, 1.0, np.where(carried, -1.0, np.sign(gained)))
+        return np.where(rewards[:, None] > 0, 1.0, np.where(gained == 0, neither, np.sign(gained)))
 
     def _enter(self, layout_ids: npt.NDArray[np.int64]) -> None:
         """Work out the moves of kitchens that are new."""
