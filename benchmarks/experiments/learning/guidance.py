@@ -19,21 +19,16 @@ __all__ = ["Guide", "moves_between"]
 _HANDS_EMPTY = 6
 """Of a vector observation."""
 
-_IDLE = -0.5
-"""For a step that leads nowhere, such as a turn: less than for one nearer, or nobody would begin to walk."""
-
 Floats = npt.NDArray[np.float64]
 
 
 class Guide:
-    """Tells of every step of a cook whether it led nearer to what they need next: 1, farther: -1, or neither: -0.5.
+    """Tells of every step of a cook whether it led nearer to a valid goal: 1, farther: -1, or neither: 0.
 
-    A cook is as far away as from the nearest of their valid goals (``info["goal_mask"]``), farther if their hands are
-    empty than if they hold what is of use, and farthest while they hold what is of no use now: then every step is one
-    away but the one that puts it down, so that nothing is gained by carrying it about. To wait beside a pot or the
-    serving station, with what belongs there, is 0. A step that is rewarded, as one
-    that puts an ingredient in a pot is with ``shaping``, led nearer. Nothing is looked up in the game: the goals are in
-    infos, the cook's cell and hands in observations.
+    A cook is as many moves away as from the nearest of their valid goals (``info["goal_mask"]``), ``H + W`` more if
+    their hands are empty, and twice as many more if they hold what is of no use now and must be put away. A step that
+    is rewarded, as one that puts an ingredient in a pot is with ``shaping``, has led nearer. Nothing is looked up in
+    the game: the goals are in infos, the cook's cell and hands in observations.
 
     It is no reward. A reward of this kind (a potential, Ng, Harada and Russell 1999) is soon expected by the critic,
     and then guides no more where no other reward was found yet. It is added to advantages, see :func:`.collect`, with
@@ -54,7 +49,6 @@ class Guide:
             raise ValueError("`ppo.guide` is for kitchens seen as grids or vectors; expected 0 for others")
         self.envs, self.space = envs, space
         self.height, self.width = envs.shape
-        self.reach = self.height * self.width  # farther than any goal
         cells = self.height * self.width
         self._moves = np.zeros((envs.num_envs, cells, cells), dtype=np.int16)
         self._takers = np.zeros((envs.num_envs, cells), dtype=np.bool_)
@@ -67,7 +61,7 @@ class Guide:
         self._before = self._away(obs, infos["goal_mask"], np.arange(len(self._ids)))
 
     def nearer(self, obs: npt.NDArray[Any], rewards: npt.NDArray[Any], infos: Mapping[str, Any]) -> Floats:
-        """``(N, players)`` from -1 to 1 for a step; arguments are what the step returned."""
+        """``(N, players)`` 1, -1 or 0 for a step; arguments are what the step returned."""
         everyone = np.arange(len(self._ids))
         ended = np.flatnonzero(infos["_final_obs"]) if "_final_obs" in infos else np.empty(0, dtype=np.intp)
         reached = None
@@ -79,10 +73,8 @@ class Guide:
         gained = self._before - after
         if reached is not None:
             gained[ended] = self._before[ended] - reached
-        # Neither: with what is of use beside where it belongs, a cook may have to wait; elsewhere time is lost.
-        neither = np.select([self._before == 0, self._before >= 2 * self.reach], [0.0, -1.0], _IDLE)
         self._before = after
-        return np.where(rewards[:, None] > 0, 1.0, np.where(gained == 0, neither, np.sign(gained)))
+        return np.where(rewards[:, None] > 0, 1.0, np.sign(gained))
 
     def _enter(self, layout_ids: npt.NDArray[np.int64]) -> None:
         """Work out the moves of kitchens that are new."""
@@ -106,8 +98,8 @@ class Guide:
         nearest = np.where(marked, away, cells).min(axis=2)
         # What is held is of use where a pot or the serving station takes it, and these take nothing else.
         useful = (marked & self._takers[which, None]).any(axis=2)
-        away = np.where(useful, nearest, np.where(empty, self.reach + nearest, 2 * self.reach))
-        return np.where(marked.any(axis=2), away, 0).astype(np.float64)
+        behind = np.where(useful, 0, np.where(empty, 1, 2)) * (self.height + self.width)
+        return np.where(marked.any(axis=2), nearest + behind, 0).astype(np.float64)
 
     def _cells_and_hands(self, rows: npt.NDArray[Any]) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.bool_]]:
         """``(B,)`` the cells that cooks stand in, and whether their hands are empty."""

@@ -14,7 +14,7 @@ DOMAINS: Final = {"overcooked": "LegibleOvercooked-v0", "tabletop": "LegibleTabl
 
 _GRID: Final = NetworkShape(channels=[32, 16], hidden=[128])
 _KITCHEN: Final = PPOSettings(
-    num_envs=32, rollout=128, batch=512, entropy=0.02, final_entropy=0.003, guide=0.2, guide_until=0.9
+    num_envs=32, rollout=128, batch=512, entropy=0.02, final_entropy=0.003, guide=0.2, guide_until=1.0
 )
 _TABLE: Final = PPOSettings(
     rollout=512,
@@ -47,6 +47,7 @@ def recipe(domain: str, arguments: Mapping[str, Any]) -> TrainingSettings:
             network=network,
             ppo=_KITCHEN,
             steps=1_000_000,
+            checkpoint_every=40_000,
         )
     if domain == "tabletop":
         table = {"max_speed": 0.5, "shaping": {"discount": _TABLE.gamma}, **arguments}

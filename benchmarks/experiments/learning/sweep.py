@@ -96,7 +96,7 @@ def trials_of(settings: Settings, kitchens: Iterable[Mapping[str, Any]]) -> list
         for name in settings.tasks:
             task = TASKS[name]
             steps = task.quick_steps if settings.quick else task.steps
-            changes = {**task.changes, "steps": steps, "seed": seed, "checkpoint_every": min(steps, 100_000)}
+            changes = {**task.changes, "steps": steps, "seed": seed}
             trials.append(
                 {
                     "task": name,
