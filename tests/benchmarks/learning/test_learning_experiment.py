@@ -86,7 +86,8 @@ def test_elsewhere_is_told_as_a_share_of_the_scripted_return() -> None:
 @pytest.mark.slow
 def test_the_experiment_runs_and_its_report_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("torch")
-    task = Task("overcooked", {"recipes": [["onion"]], "layouts": "random:train"}, 8192, 8192, elsewhere=True)
+    arguments = {"recipes": [["onion"]], "layouts": "random:train", "max_episode_steps": 100}
+    task = Task("overcooked", arguments, 8192, 8192, elsewhere=True)
     monkeypatch.setattr(sweep, "TASKS", {"small": task})
     monkeypatch.setattr("benchmarks.experiments.learning.run.TASKS", {"small": task})
     settings = dataclasses.replace(QUICK, tasks=("small",), seeds=1, episodes=2, initial=20, improvements=1)
