@@ -27,6 +27,7 @@ from benchmarks.cli.study_data import DATA_COMMANDS
 from benchmarks.cli.study_server import code, recruit, serve
 from benchmarks.cli.study_simulate import simulate
 from benchmarks.cli.sweep import sweep
+from benchmarks.cli.train import train
 from benchmarks.console import tell
 from legible_envs import __version__
 
@@ -35,6 +36,7 @@ __all__ = ["main"]
 
 CONTENTS = {
     "Search": ("optimize", "report"),
+    "Learning": ("train",),
     "Layouts": ("score", "show", "play"),
     "Participants and predictors": ("humans fetch", "humans stats", "humans evaluate", "datasets make"),
     "Experiments": ("sweep", "reproduce", "bench"),
@@ -81,6 +83,7 @@ def main(traceback: bool) -> None:
 main.add_command(datasets)
 main.add_command(sweep)
 main.add_command(reproduce)
+main.add_command(train)
 main.add_command(study)
 for command in (simulate, serve, recruit, code, *DATA_COMMANDS):
     study.add_command(command)

@@ -61,6 +61,11 @@ EXPERIMENTS: Final = {
         "Which search finds the most legible kitchens?",
         "Emitters under the same scheduler, at the paper's number of iterations and at equal numbers of evaluations.",
     ),
+    "learning": Experiment(
+        {".": "benchmarks.experiments.learning"},
+        "How well does an agent learn to cook, and to build?",
+        "PPO in fixed and in random kitchens and at the table, beside a scripted cook.",
+    ),
 }
 
 
