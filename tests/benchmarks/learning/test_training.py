@@ -210,5 +210,5 @@ def test_a_cook_learns_a_soup_of_one_onion(tmp_path: Path) -> None:
     curve = train(settings, tmp_path).curve
     after = summary(evaluate_policy(load_policy(tmp_path), settings.environment, 32, 0))
     assert curve[0, 1] == 0  # nobody finishes within the first steps
-    assert after["finished"] > 0.95
-    assert after["length"] < 80
+    assert after["finished"] > 0.9  # of 32 games
+    assert after["length"] < 130  # the scripted cook takes 33 steps, and games are cut off at 1,200
