@@ -126,7 +126,8 @@ class ReachObserver(ABC):
         kind = type(self._given).__name__
         reason = ValueError(
             f"predictor {self.name} must be fitted, and fitting it on simulated participants {self.place} "
-            f"failed ({type(error).__name__}: {error}); pass a fitted instance, such as predictor={kind}().fit(trajectories)"
+            f"failed ({type(error).__name__}: {error}); pass a fitted instance, such as "
+            f"predictor={kind}().fit(trajectories)"
         )
         if self._is_named:
             self._fitted_on = None

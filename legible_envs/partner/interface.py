@@ -36,8 +36,16 @@ class TeamSenses(Protocol):
         """What is in the person's hand."""
 
 
-class ReachSenses(TeamSenses, Protocol):
+class ReachSenses(Protocol):
     """The part of a robot's senses from which a predictor says where a reach leads."""
+
+    @property
+    def reach_number(self) -> int:
+        """How many reaches have begun; a change tells that the reach is another one."""
+
+    @property
+    def goals(self) -> tuple[str, ...]:
+        """What the person may validly reach for now."""
 
     @property
     def reach(self) -> npt.NDArray[np.number]:
