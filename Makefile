@@ -35,7 +35,7 @@ $(VENV)/.run-installed: $(LOCKED) pyproject.toml | $(BIN)/python
 $(VENV)/.test-installed: $(LOCKED) pyproject.toml | $(BIN)/python
 	@echo "Installing the test environment into $(VENV) (pinned versions) ..."
 	$(if $(TORCH),$(PIP) $(TORCH))
-	$(PIP) -c $(LOCKED) -e '.[dev,distributed,docs,minari,study$(if $(TORCH),$(comma)rl)]'
+	$(PIP) -c $(LOCKED) -e '.[dev,distributed,docs,minari,multiagent,study$(if $(TORCH),$(comma)rl)]'
 	$(PIP) -c $(LOCKED) --no-deps $(EXAMPLES:%=-e %)
 	@touch $@ $(VENV)/.run-installed
 
@@ -84,10 +84,11 @@ bench: $(VENV)/.run-installed
 lock: | $(BIN)/python
 	$(PIP) uv
 	$(BIN)/uv pip compile --quiet --universal --upgrade --python-version 3.11 --no-emit-index-url --no-emit-find-links \
-	  --no-header --no-annotate pyproject.toml --extra dev --extra distributed --extra minari --extra study --extra docs -o $(LOCKED)
+	  --no-header --no-annotate pyproject.toml --extra dev --extra distributed --extra minari --extra multiagent --extra study --extra docs -o $(LOCKED)
 	echo "torch==2.13.0" >> $(LOCKED)
 	# Without their dependencies: torch would bring its builds with CUDA, all others are pinned above.
-	printf '%s\n' sb3-contrib stable-baselines3 | $(BIN)/uv pip compile --quiet --no-deps --upgrade --python-version 3.11 \
+	printf '%s\n' absl-py grpcio markdown protobuf sb3-contrib stable-baselines3 tensorboard tensorboard-data-server werkzeug | \
+	  $(BIN)/uv pip compile --quiet --no-deps --upgrade --python-version 3.11 \
 	  --no-emit-index-url --no-emit-find-links --no-header --no-annotate - >> $(LOCKED)
 
 # make clean   remove environments, caches and runs

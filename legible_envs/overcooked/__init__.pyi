@@ -1,7 +1,7 @@
 from .design.workspace import OvercookedWorkspace
 from .kitchen_file import KitchenFile
 from .layout import OvercookedLayout
-from .learners import as_sb3
+from .learners import as_sb3, parallel_env
 from .reach import Reach, reach_of
 from .recipes import PAPER_SOUPS, soup_task
 from .scoring.scorer import OvercookedScorer
@@ -14,6 +14,7 @@ __all__ = [
     "OvercookedWorkspace",
     "Reach",
     "as_sb3",
+    "parallel_env",
     "reach_of",
     "soup_task",
 ]

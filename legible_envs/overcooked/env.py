@@ -271,7 +271,7 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
         self._begun = True
         if self.render_mode == "human":
             self.render()
-        return self._observe(), self._info(masks)
+        return self.observe(), self._info(masks)
 
     def step(self, action: Any) -> tuple[npt.NDArray[Any], float, bool, bool, dict[str, Any]]:
         """Advance the game by one tick.
@@ -302,7 +302,7 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
         )
         if self.render_mode == "human":
             self.render()
-        return self._observe(), reward, over, False, self._info(masks)
+        return self.observe(), reward, over, False, self._info(masks)
 
     def _picture(self) -> npt.NDArray[np.uint8]:
         from legible_envs.overcooked.rendering import draw_game
@@ -354,7 +354,8 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
         self._layout_number = int(packed.layout.layout_id, 16)
         self._state = np.zeros(int(packed.rules[STATE_SIZE]), dtype=np.int32)
 
-    def _observe(self) -> npt.NDArray[Any]:
+    def observe(self) -> npt.NDArray[Any]:
+        """The observation of this moment, made anew."""
         if self._players == 1:
             return self._observe_as(0)
         return np.stack([self._observe_as(player) for player in range(self._players)])

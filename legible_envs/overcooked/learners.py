@@ -1,4 +1,4 @@
-"""The batched kitchen for libraries of reinforcement learning that have vector environments of their own."""
+"""Kitchens for libraries of reinforcement learning that have an interface of their own."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from legible_envs.overcooked.vector_env import OvercookedVectorEnv
 from legible_envs.support.validation import shown
 
 if TYPE_CHECKING:
+    from legible_envs.overcooked.parallel import OvercookedParallelEnv
     from legible_envs.overcooked.stable_baselines3 import StableBaselinesVecEnv
 
-__all__ = ["as_sb3"]
+__all__ = ["as_sb3", "parallel_env"]
 
 
 def as_sb3(envs: Any) -> StableBaselinesVecEnv:
@@ -47,3 +48,29 @@ def as_sb3(envs: Any) -> StableBaselinesVecEnv:
             'as_sb3 needs Stable-Baselines3, which is not installed: pip install "legible-envs[rl]"'
         ) from error
     return StableBaselinesVecEnv(envs)
+
+
+def parallel_env(num_players: int = 2, **kwargs: Any) -> OvercookedParallelEnv:
+    """A kitchen of several cooks as a PettingZoo ``ParallelEnv``, for learners of many agents.
+
+    Args:
+        num_players: 1 to 4 cooks, the agents ``player_0``, ``player_1``, ….
+        **kwargs: As for :class:`.OvercookedParallelEnv`: ``max_episode_steps``, ``render_mode``, and the arguments of
+            ``gymnasium.make("LegibleOvercooked-v0")``.
+
+    Raises:
+        ImportError: PettingZoo is not installed (``pip install "legible-envs[multiagent]"``).
+        LayoutError: See :class:`.OvercookedEnv`.
+        ValueError: Likewise.
+
+    Example:
+        >>> from legible_envs.overcooked import parallel_env
+        >>> env = parallel_env(num_players=2, shaping=True)
+        >>> observations, infos = env.reset(seed=0)
+        >>> while env.agents:
+        ...     actions = {agent: env.action_space(agent).sample(infos[agent]["action_mask"]) for agent in env.agents}
+        ...     observations, rewards, terminations, truncations, infos = env.step(actions)
+    """
+    from legible_envs.overcooked.parallel import OvercookedParallelEnv
+
+    return OvercookedParallelEnv(num_players, **kwargs)

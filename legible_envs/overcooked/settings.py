@@ -142,7 +142,7 @@ class KitchenSettings:
     def action_space(self) -> spaces.Discrete[Any] | spaces.MultiDiscrete[Any]:
         """The space of one environment's actions: those of all players."""
         if self.num_players == 1:
-            return spaces.Discrete(NUM_ACTIONS)
+            return self.player_action_space()
         return spaces.MultiDiscrete([NUM_ACTIONS] * self.num_players)
 
     def observation_space(self) -> spaces.Box:
@@ -152,6 +152,11 @@ class KitchenSettings:
             return space
         low, high = (np.repeat(bound[None], self.num_players, axis=0) for bound in (space.low, space.high))
         return spaces.Box(low, high, dtype=space.dtype.type)  # type: ignore[union-attr]
+
+    @staticmethod
+    def player_action_space() -> spaces.Discrete[Any]:
+        """The space of one player's actions."""
+        return spaces.Discrete(NUM_ACTIONS)
 
     def player_observation_space(self) -> spaces.Box:
         """The space of what one player observes."""

@@ -1,6 +1,7 @@
 from .design.differentiable import DifferentiableTable
 from .design.workspace import TabletopWorkspace
 from .layout import TabletopLayout
+from .learners import parallel_env
 from .objects import Table, TableObject, VirtualObstacle
 from .partner.belief import GoalBelief
 from .partner.robot import RobotPartner
@@ -18,4 +19,5 @@ __all__ = [
     "TabletopTask",
     "TabletopWorkspace",
     "VirtualObstacle",
+    "parallel_env",
 ]

@@ -546,6 +546,10 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
         """Keys for ``gymnasium.utils.play`` (``noop=np.zeros(2)``): arrows or W A S D; let go to take and place."""
         return keys_to_action(self.max_speed)
 
+    def observe(self) -> npt.NDArray[np.float32]:
+        """The observation of this moment, made anew."""
+        return self._observations.observe(self._game, self._team, self._game.goals)
+
     def _look(self) -> tuple[npt.NDArray[np.float32], dict[str, Any]]:
         """Observation and info of this moment."""
         goals = self._game.goals

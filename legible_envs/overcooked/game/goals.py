@@ -74,13 +74,23 @@ def _pot_goals(
 
 
 @kernel
-def _wanted(state: Vector, kitchen: Kitchen, rules: Vector, region: int, player: int) -> int:
+def _in_use(cell: int, state: Vector, kitchen: Kitchen, rules: Vector) -> bool:
+    """Whether any player can get to a cell: what one cannot bring there, another may be handed."""
+    cells = rules[HEIGHT] * rules[WIDTH]
+    for player in range(rules[NUM_PLAYERS]):
+        if usable(cell, kitchen[cells + state[AT_PLAYERS + 3 * player]], kitchen, rules):
+            return True
+    return False
+
+
+@kernel
+def _wanted(state: Vector, kitchen: Kitchen, rules: Vector, player: int) -> int:
     """Bit mask of the items that empty hands should fetch; bit 6 stands for every soup."""
     wanted = 1 << SOUP
     soups = 0
     for number in range(rules[NUM_POTS]):
         pot = rules[AT_POTS] + POT_RECORD * number
-        if state[pot] < 0 or not usable(state[pot], region, kitchen, rules):
+        if state[pot] < 0 or not _in_use(state[pot], state, kitchen, rules):
             continue
         if state[pot + 6] >= 0:
             soups += 1
@@ -101,7 +111,8 @@ def find_goals(state: Vector, kitchen: Kitchen, rules: Vector, player: int, goal
     """Mark the cells that a player may reach for next.
 
     Empty hands reach for what some pot accepts, for a dish once a soup is on the fire, and for soups on counters; full
-    hands for where the item is of use. An item that is of no use now is taken back or put on any free counter.
+    hands for where the item is of use. An item that is of no use now is taken back or put on any free counter. In a
+    divided kitchen that is also what somebody else can use, and the counters to hand it over on.
 
     Args:
         state: See ``vectors``.
@@ -118,7 +129,7 @@ def find_goals(state: Vector, kitchen: Kitchen, rules: Vector, player: int, goal
     region = kitchen[cells + state[AT_PLAYERS + 3 * player]]
     if 0 < held < SOUP and _pot_goals(state, kitchen, rules, region, held, goals):
         return
-    wanted = _wanted(state, kitchen, rules, region, player) if held == 0 else 0
+    wanted = _wanted(state, kitchen, rules, player) if held == 0 else 0
     for cell in range(cells):
         code = kitchen[cell]
         useful = False

@@ -106,6 +106,10 @@ class Team:
             self._metrics = TeamMetrics()
         self.sense(game)
 
+    def instruct(self, command: Command) -> None:
+        """Give the robot another command for the next tick than the one it chose."""
+        self.command = command
+
     def act(self, game: TableGame) -> int:
         """Carry out the robot's command for one tick; returns how many subtasks this finished."""
         command = self.command
