@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from legible_envs.overcooked.game.vectors import DISH, SOUP
+from legible_envs.overcooked.game.vectors import AT_ITEMS, DISH, POT_CELL, SERVING_CELL, SOUP
 from legible_envs.overcooked.layout import COUNTER
 from legible_envs.overcooked.partner.interface import PARTNER, PERSON, Senses
-from legible_envs.overcooked.partner.needs import item_at, needed_beside, put_away_cells, used_cells
+from legible_envs.overcooked.partner.needs import (
+    can_use,
+    item_at,
+    needed_beside,
+    put_away_cells,
+    shared_counters,
+    used_cells,
+)
 from legible_envs.overcooked.partner.ways import Floor
 
 __all__ = ["Job", "choose_job"]
 
 Flags = npt.NDArray[np.bool_]
+
+_NOWHERE: Final = -1
 
 
 class Job(NamedTuple):
@@ -27,10 +36,10 @@ class Job(NamedTuple):
     """
 
     state: str = "wait"
-    target: int = -1
+    target: int = _NOWHERE
 
 
-class _Bringing(NamedTuple):
+class _Brought(NamedTuple):
     """Something the person brings or may bring: where it comes from (-1: they hold it), and the item."""
 
     cell: int
@@ -60,13 +69,22 @@ def choose_job(senses: Senses, floor: Floor, before: Job, predicted: int, *, imp
     return _nearest("fetch", jobs, floor, here, before)
 
 
+# -- full hands -------------------------------------------------------------------------------------------------------
+
+
 def _with_full_hands(senses: Senses, floor: Floor, held: int) -> tuple[str, Flags]:
-    if held >= SOUP:
-        return "use", senses.partner_goals
+    """What to do with what the robot holds, and the cells where it can be done."""
     cells = np.zeros(len(senses.partner_goals), dtype=np.bool_)
-    used_cells(senses.state, senses.kitchen, senses.rules, PARTNER, held, cells)
-    if cells.any() and not _comes_second(senses, floor, held, cells):
-        return "use", cells
+    if not _can_use(senses, PARTNER, held):
+        cells = _free_shared_counters(senses)
+        if cells.any() and needed_beside(senses.state, senses.rules, held, _items(_on_shared_counters(senses))):
+            return "use", cells
+    elif held >= SOUP:
+        return "use", senses.partner_goals
+    else:
+        used_cells(senses.state, senses.kitchen, senses.rules, PARTNER, held, cells)
+        if cells.any() and not _comes_second(senses, floor, held, cells):
+            return "use", cells
     put_away_cells(senses.state, senses.kitchen, senses.rules, PARTNER, held, cells)
     return "away", cells
 
@@ -74,7 +92,7 @@ def _with_full_hands(senses: Senses, floor: Floor, held: int) -> tuple[str, Flag
 def _comes_second(senses: Senses, floor: Floor, held: int, pots: Flags) -> bool:
     """Whether the person holds what makes the robot's item useless, and is not farther from the pot."""
     here, person = senses.player(PARTNER)[0], senses.player(PERSON)
-    if not 0 < person[2] <= DISH or needed_beside(senses.state, senses.rules, PARTNER, held, person[2]):
+    if not _can_use(senses, PERSON, held) or needed_beside(senses.state, senses.rules, held, _items([person[2]])):
         return False
     mine, theirs = (_least(floor, pots, cell) for cell in (here, person[0]))
     return 1 < mine and theirs <= mine
@@ -86,38 +104,80 @@ def _least(floor: Floor, goals: Flags, cell: int) -> float:
     return min((count for count in steps if count >= 0), default=float("inf"))
 
 
-def _known(senses: Senses, predicted: int) -> list[_Bringing]:
+# -- empty hands ------------------------------------------------------------------------------------------------------
+
+
+def _known(senses: Senses, predicted: int) -> list[_Brought]:
     """What the person brings, as far as it is seen or predicted."""
     held = senses.player(PERSON)[2]
     if held:
-        return [_Bringing(-1, held)]
-    return [_bringing(senses, predicted)] if predicted >= 0 else []
+        return [_Brought(_NOWHERE, held)]
+    return [_brought(senses, predicted)] if predicted >= 0 else []
 
 
-def _possible(senses: Senses) -> list[_Bringing]:
+def _possible(senses: Senses) -> list[_Brought]:
     """All that the person may fetch."""
-    return [_bringing(senses, cell) for cell in np.flatnonzero(senses.person_goals).tolist()]
+    return [_brought(senses, cell) for cell in np.flatnonzero(senses.person_goals).tolist()]
 
 
-def _bringing(senses: Senses, cell: int) -> _Bringing:
-    return _Bringing(cell, int(item_at(senses.state, senses.kitchen, senses.rules, cell)))
+def _brought(senses: Senses, cell: int) -> _Brought:
+    return _Brought(cell, int(item_at(senses.state, senses.kitchen, senses.rules, cell)))
 
 
-def _needed(senses: Senses, brought: list[_Bringing]) -> Flags:
-    """The cells whose item is needed beside each thing brought, and is not that very thing."""
+def _needed(senses: Senses, brought: list[_Brought]) -> Flags:
+    """The robot's goals whose item is needed beside each thing brought, and is not that very thing."""
     jobs = senses.partner_goals.copy()
     beside: dict[tuple[int, int], bool] = {}
     for cell in np.flatnonzero(jobs).tolist():
-        item = _bringing(senses, cell).item
-        for other in brought:
-            if (item, other.item) not in beside:
-                beside[item, other.item] = bool(
-                    needed_beside(senses.state, senses.rules, PARTNER, item, other.item)
-                )
+        item = _brought(senses, cell).item
+        handed: list[int] = []
+        if not _can_use(senses, PARTNER, item):
+            handed = _on_shared_counters(senses)
+            if _shared(senses)[cell]:  # it lies where the person can take it
+                jobs[cell] = False
+                continue
+        for other in brought or [_Brought(_NOWHERE, 0)]:
+            # What the person cannot use themselves, they bring for the robot.
+            theirs = other.item if _can_use(senses, PERSON, other.item) else 0
+            if (item, theirs) not in beside:
+                others = _items([theirs, *handed])
+                beside[item, theirs] = bool(needed_beside(senses.state, senses.rules, item, others))
             is_the_same = other.cell == cell and senses.kitchen[cell] == COUNTER
-            if is_the_same or not beside[item, other.item]:
+            if is_the_same or not beside[item, theirs]:
                 jobs[cell] = False
     return jobs
+
+
+# -- divided kitchens -------------------------------------------------------------------------------------------------
+
+
+def _can_use(senses: Senses, player: int, item: int) -> bool:
+    """Whether a player can get to where an item is used: a pot, or for soups a serving station."""
+    code = SERVING_CELL if item >= SOUP else POT_CELL
+    return bool(can_use(senses.kitchen, senses.rules, senses.player(player)[0], code))
+
+
+def _shared(senses: Senses) -> Flags:
+    cells = np.zeros(len(senses.partner_goals), dtype=np.bool_)
+    shared_counters(senses.state, senses.kitchen, senses.rules, cells)
+    return cells
+
+
+def _free_shared_counters(senses: Senses) -> Flags:
+    at = int(senses.rules[AT_ITEMS])
+    cells: Flags = _shared(senses) & (senses.state[at : at + len(senses.partner_goals)] == 0)
+    return cells
+
+
+def _on_shared_counters(senses: Senses) -> list[int]:
+    """Items that lie ready for the other."""
+    at = int(senses.rules[AT_ITEMS])
+    items = senses.state[at : at + len(senses.partner_goals)][_shared(senses)]
+    return [int(item) for item in items if 0 < item <= DISH]
+
+
+def _items(listed: list[int]) -> npt.NDArray[np.int64]:
+    return np.array(listed, dtype=np.int64)
 
 
 def _nearest(state: str, cells: Flags, floor: Floor, here: int, before: Job) -> Job:

@@ -1,6 +1,6 @@
 """What is still needed if somebody else brings something too: kernels on the vectors described in ``game.vectors``.
 
-An item is *needed beside another* if the pots can use both: one more onion is not needed for a soup that lacks one
+An item is *needed beside others* if the pots can use them all: one more onion is not needed for a soup that lacks one
 onion while somebody brings it, unless another pot takes it for another order.
 """
 
@@ -17,7 +17,6 @@ from legible_envs.overcooked.game.vectors import (
     DISH,
     DISH_CELL,
     HEIGHT,
-    NUM_PLAYERS,
     NUM_POTS,
     POT_RECORD,
     PUT_BACK,
@@ -29,7 +28,10 @@ from legible_envs.overcooked.game.vectors import (
 from legible_envs.overcooked.layout import COUNTER, OBSTACLE
 from legible_envs.support.compiled import kernel
 
-__all__ = ["item_at", "needed_beside", "put_away_cells", "used_cells"]
+__all__ = ["can_use", "item_at", "needed_beside", "put_away_cells", "shared_counters", "used_cells"]
+
+Flags = npt.NDArray[np.bool_]
+Items = npt.NDArray[np.int64]
 
 
 @kernel
@@ -37,69 +39,69 @@ def item_at(state: Vector, kitchen: Kitchen, rules: Vector, cell: int) -> int:
     """The item that empty hands would take from a station or counter; 0 for none, and for pots and serving."""
     code = kitchen[cell]
     if code == COUNTER:
-        return state[rules[AT_ITEMS] + cell]
-    return code - 2 if OBSTACLE < code <= DISH_CELL else 0
+        return int(state[rules[AT_ITEMS] + cell])
+    return int(code) - 2 if OBSTACLE < code <= DISH_CELL else 0
 
 
 @kernel
-def _accepted(state: Vector, rules: Vector, item: int) -> bool:
-    """Whether some pot takes an ingredient."""
-    for number in range(rules[NUM_POTS]):
-        pot = rules[AT_POTS] + POT_RECORD * number
-        if state[pot] >= 0 and accepts(state, rules, pot, item):
+def can_use(kitchen: Kitchen, rules: Vector, cell: int, code: int) -> bool:
+    """Whether one who stands on a cell can get to some station of a code."""
+    cells = rules[HEIGHT] * rules[WIDTH]
+    for station in range(cells):
+        if kitchen[station] == code and usable(station, kitchen[cells + cell], kitchen, rules):
             return True
     return False
 
 
 @kernel
-def _dishes_wanted(state: Vector, rules: Vector, but: int) -> int:
-    """Soups in pots, less the dishes in the hands of all players but one."""
+def _accepted_beside(state: Vector, rules: Vector, item: int, others: Items, number: int) -> bool:
+    """Whether some pot takes an ingredient after all others, from ``number`` on, have gone where they are taken."""
+    if number == len(others):
+        for n in range(rules[NUM_POTS]):
+            pot = rules[AT_POTS] + POT_RECORD * n
+            if state[pot] >= 0 and accepts(state, rules, pot, item):
+                return True
+        return False
+    taken = False
+    if 0 < others[number] < DISH:
+        for n in range(rules[NUM_POTS]):
+            pot = rules[AT_POTS] + POT_RECORD * n
+            if state[pot] >= 0 and accepts(state, rules, pot, others[number]):
+                taken = True
+                after = state.copy()
+                add_to_pot(after, rules, pot, others[number])
+                if _accepted_beside(after, rules, item, others, number + 1):
+                    return True
+    return not taken and _accepted_beside(state, rules, item, others, number + 1)
+
+
+@kernel
+def needed_beside(state: Vector, rules: Vector, item: int, others: Items) -> bool:
+    """Whether an item is of use although somebody else brings others.
+
+    Args:
+        state: See ``vectors``.
+        rules: See ``vectors``.
+        item: An ingredient that a pot is to take, a dish for a soup in a pot, or a soup, which is always needed.
+        others: ``(k,)`` what else is brought; what is of no use itself does not count.
+    """
+    if item >= SOUP:
+        return True
+    if item < DISH:
+        return _accepted_beside(state, rules, item, others, 0)
     wanted = 0
     for number in range(rules[NUM_POTS]):
         pot = rules[AT_POTS] + POT_RECORD * number
         if state[pot] >= 0 and state[pot + 6] >= 0:
             wanted += 1
-    for player in range(rules[NUM_PLAYERS]):
-        if player != but and state[AT_PLAYERS + 3 * player + 2] == DISH:
+    for other in others:
+        if other == DISH:
             wanted -= 1
-    return wanted
+    return wanted > 0
 
 
 @kernel
-def needed_beside(state: Vector, rules: Vector, player: int, item: int, other: int) -> bool:
-    """Whether an item that a player brings is of use although somebody else brings ``other``.
-
-    Args:
-        state: See ``vectors``.
-        rules: See ``vectors``.
-        player: Number of the player, whose own hands do not count.
-        item: What the player would bring: an ingredient, a dish, or a soup, which is always needed.
-        other: What somebody else, whose hands are empty now or hold just this, brings; 0 for nothing.
-    """
-    if item >= SOUP:
-        return True
-    if item == DISH:
-        wanted = _dishes_wanted(state, rules, player)
-        held = False
-        for number in range(rules[NUM_PLAYERS]):
-            held = held or (number != player and state[AT_PLAYERS + 3 * number + 2] == DISH)
-        return wanted > (1 if other == DISH and not held else 0)
-    if not 0 < other < DISH or not _accepted(state, rules, other):
-        return _accepted(state, rules, item)
-    for number in range(rules[NUM_POTS]):
-        pot = rules[AT_POTS] + POT_RECORD * number
-        if state[pot] >= 0 and accepts(state, rules, pot, other):
-            after = state.copy()
-            add_to_pot(after, rules, pot, other)
-            if _accepted(after, rules, item):
-                return True
-    return False
-
-
-@kernel
-def used_cells(
-    state: Vector, kitchen: Kitchen, rules: Vector, player: int, item: int, cells: npt.NDArray[np.bool_]
-) -> None:
+def used_cells(state: Vector, kitchen: Kitchen, rules: Vector, player: int, item: int, cells: Flags) -> None:
     """Mark the pots that take an ingredient in the player's hands, and those whose soup a dish is for."""
     region = kitchen[rules[HEIGHT] * rules[WIDTH] + state[AT_PLAYERS + 3 * player]]
     cells[:] = False
@@ -114,15 +116,23 @@ def used_cells(
 
 
 @kernel
-def put_away_cells(
-    state: Vector, kitchen: Kitchen, rules: Vector, player: int, item: int, cells: npt.NDArray[np.bool_]
-) -> None:
+def put_away_cells(state: Vector, kitchen: Kitchen, rules: Vector, player: int, item: int, cells: Flags) -> None:
     """Mark where a player can put what they hold out of the way: where it came from, and on free counters."""
     count = rules[HEIGHT] * rules[WIDTH]
     region = kitchen[count + state[AT_PLAYERS + 3 * player]]
     for cell in range(count):
         code = kitchen[cell]
         free = code == COUNTER and state[rules[AT_ITEMS] + cell] == 0
-        cells[cell] = (free or (code == item + 2 and item <= DISH and rules[PUT_BACK] != 0)) and usable(
-            cell, region, kitchen, rules
-        )
+        came_from = code == item + 2 and item <= DISH and rules[PUT_BACK] != 0
+        cells[cell] = (free or came_from) and usable(cell, region, kitchen, rules)
+
+
+@kernel
+def shared_counters(state: Vector, kitchen: Kitchen, rules: Vector, cells: Flags) -> None:
+    """Mark the counters that the first two players can both get to."""
+    count = rules[HEIGHT] * rules[WIDTH]
+    for cell in range(count):
+        cells[cell] = kitchen[cell] == COUNTER
+        for player in range(2):
+            region = kitchen[count + state[AT_PLAYERS + 3 * player]]
+            cells[cell] = cells[cell] and usable(cell, region, kitchen, rules)
