@@ -95,7 +95,7 @@ def _comes_second(senses: Senses, floor: Floor, held: int, pots: Flags) -> bool:
     if not _can_use(senses, PERSON, held) or needed_beside(senses.state, senses.rules, held, _items([person[2]])):
         return False
     mine, theirs = (_least(floor, pots, cell) for cell in (here, person[0]))
-    return 1 < mine and theirs <= mine
+    return mine > 1 and theirs <= mine
 
 
 def _least(floor: Floor, goals: Flags, cell: int) -> float:

@@ -75,9 +75,7 @@ class RobotPartner:
         TypeError: An object that is no predictor.
     """
 
-    def __init__(
-        self, predictor: object = None, *, threshold: float = 0.8, patience: int = 20, hold: int = 4
-    ) -> None:
+    def __init__(self, predictor: object = None, *, threshold: float = 0.8, patience: int = 20, hold: int = 4) -> None:
         self.threshold = real("the robot's `threshold`", threshold, 0, 1)
         self.patience = integer("the robot's `patience`", patience, 1, 10_000)
         self.hold = integer("the robot's `hold`", hold, 1, 10_000)
