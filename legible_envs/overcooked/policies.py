@@ -121,15 +121,16 @@ class ScriptedPlayer:
 
     def _has_goal(self, index: int, goal_mask: npt.NDArray[np.bool_], layout_id: int) -> bool:
         """Whether there is a goal to walk to; if the last one is no longer valid, another is drawn."""
+        if layout_id != self._layout_ids[index]:
+            self._layout_ids[index] = layout_id
+            self._floors[index] = None
+            self._goals[index] = -1
         marked = goal_mask.ravel()
-        if layout_id == self._layout_ids[index] and self._goals[index] >= 0 and marked[self._goals[index]]:
+        if self._goals[index] >= 0 and marked[self._goals[index]]:
             return True
         choices = np.flatnonzero(marked)
         if not len(choices):
             return False
-        if layout_id != self._layout_ids[index]:
-            self._layout_ids[index] = layout_id
-            self._floors[index] = None
         self._goals[index] = int(self.rng.choice(choices))
         self._forget_path(index)
         return True
@@ -153,9 +154,12 @@ class ScriptedPlayer:
             )
         if self.player >= int(arrays[2][NUM_PLAYERS]):
             raise ValueError(f"there is no player {self.player} in a game of {int(arrays[2][NUM_PLAYERS])}")
-        if not self._has_goal(index, goal_mask, layout_id):
+        has_goal = self._has_goal(index, goal_mask, layout_id)
+        action = -1
+        if int(arrays[2][NUM_PLAYERS]) > 1 and self.gives_way:
+            action = self._go_away(index, arrays, idle=not has_goal)
+        if action < 0 and not has_goal:
             return STAY
-        action = self._go_away(index, arrays) if int(arrays[2][NUM_PLAYERS]) > 1 and self.gives_way else -1
         if action < 0:
             action = self._approach(index, arrays, bool(action_mask[INTERACT]))
         if action == INTERACT:
@@ -168,29 +172,30 @@ class ScriptedPlayer:
         at = AT_PLAYERS + 3 * self.player
         return int(arrays[0][at]), int(arrays[0][at + 1])
 
-    def _go_away(self, index: int, arrays: tuple[Vector, Kitchen, Vector]) -> int:
-        """A step away from the other players, for a player who was kept from the last one; -1 where none is due."""
+    def _go_away(self, index: int, arrays: tuple[Vector, Kitchen, Vector], idle: bool) -> int:
+        """A step away from the other players, where one is due; else -1.
+
+        It is due every other time to a player who was kept from the last step, or has no goal and stands beside
+        somebody.
+        """
         state, kitchen, rules = arrays
         cell = self._place(arrays)[0]
         floor = self._find_floors(index, kitchen, rules)[1]
+        others = np.delete(state[AT_PLAYERS : AT_PLAYERS + 3 * rules[NUM_PLAYERS] : 3].astype(np.int64), self.player)
+        beside = [int(neighbour(cell, direction, self._height, self._width)) for direction in range(4)]
         before, action = self._last[index]
-        if self._retreat[index] == 0 and before == cell and action < STAY:
-            towards = neighbour(cell, action, self._height, self._width)
-            if towards >= 0 and floor[towards] and self.rng.random() < 0.5:
-                self._retreat[index] = int(self.rng.integers(1, self._height + self._width))
+        kept = before == cell and action < STAY and beside[action] >= 0 and bool(floor[beside[action]])
+        is_due = kept or (idle and any(after in others for after in beside))
+        if self._retreat[index] == 0 and is_due and self.rng.random() < 0.5:
+            self._retreat[index] = int(self.rng.integers(1, self._height + self._width))
         if self._retreat[index] == 0:
             return -1
         self._retreat[index] -= 1
-        others = state[AT_PLAYERS : AT_PLAYERS + 3 * rules[NUM_PLAYERS] : 3].astype(np.int64)
-        others = np.delete(others, self.player)
         away = np.empty(len(floor), dtype=np.int32)
         steps_from(others, floor, self._height, self._width, away)
-        beside = [neighbour(cell, direction, self._height, self._width) for direction in range(4)]
         free = [d for d, after in enumerate(beside) if after >= 0 and floor[after] and after not in others]
-        if not free:
-            return STAY
-        most = max(away[beside[d]] for d in free)
-        return int(self.rng.choice([d for d in free if away[beside[d]] == most]))
+        most = max((int(away[beside[d]]) for d in free), default=-1)
+        return int(self.rng.choice([d for d in free if away[beside[d]] == most])) if free else STAY
 
     def _approach(self, index: int, arrays: tuple[Vector, Kitchen, Vector], can_interact: bool) -> int:
         """The next action on the path to a game's goal; INTERACT uses it."""

@@ -69,7 +69,7 @@ class IntentObserver(ReachObserver):
     def _context(self, senses: Senses) -> Trajectory:
         return Trajectory(
             np.zeros((0, 2)),
-            start=senses.start,
+            start=senses.start or "",
             candidates=senses.goals,
             layout=self._layout,
             candidate_set="game",

@@ -25,6 +25,7 @@ __all__ = ["Job", "choose_job"]
 Flags = npt.NDArray[np.bool_]
 
 _NOWHERE: Final = -1
+_MOST_HANDED: Final = 4  # items that lie ready for the other; more need not be counted exactly
 
 
 class Job(NamedTuple):
@@ -173,7 +174,7 @@ def _on_shared_counters(senses: Senses) -> list[int]:
     """Items that lie ready for the other."""
     at = int(senses.rules[AT_ITEMS])
     items = senses.state[at : at + len(senses.partner_goals)][_shared(senses)]
-    return [int(item) for item in items if 0 < item <= DISH]
+    return [int(item) for item in items if 0 < item <= DISH][:_MOST_HANDED]
 
 
 def _items(listed: list[int]) -> npt.NDArray[np.int64]:

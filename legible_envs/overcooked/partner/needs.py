@@ -54,25 +54,46 @@ def can_use(kitchen: Kitchen, rules: Vector, cell: int, code: int) -> bool:
 
 
 @kernel
-def _accepted_beside(state: Vector, rules: Vector, item: int, others: Items, number: int) -> bool:
-    """Whether some pot takes an ingredient after all others, from ``number`` on, have gone where they are taken."""
-    if number == len(others):
-        for n in range(rules[NUM_POTS]):
-            pot = rules[AT_POTS] + POT_RECORD * n
-            if state[pot] >= 0 and accepts(state, rules, pot, item):
-                return True
-        return False
-    taken = False
-    if 0 < others[number] < DISH:
-        for n in range(rules[NUM_POTS]):
-            pot = rules[AT_POTS] + POT_RECORD * n
-            if state[pot] >= 0 and accepts(state, rules, pot, others[number]):
-                taken = True
-                after = state.copy()
-                add_to_pot(after, rules, pot, others[number])
-                if _accepted_beside(after, rules, item, others, number + 1):
-                    return True
-    return not taken and _accepted_beside(state, rules, item, others, number + 1)
+def _accepted(state: Vector, rules: Vector, item: int) -> bool:
+    """Whether some pot takes an ingredient."""
+    for number in range(rules[NUM_POTS]):
+        pot = rules[AT_POTS] + POT_RECORD * number
+        if state[pot] >= 0 and accepts(state, rules, pot, item):
+            return True
+    return False
+
+
+@kernel
+def _place_all(state: Vector, rules: Vector, others: Items, places: int) -> bool:
+    """Put others into pots, as far as they are of use; whether they go where ``places`` says.
+
+    Args:
+        state: See ``vectors``; changed.
+        rules: See ``vectors``.
+        others: ``(k,)`` items.
+        places: Numbers of their pots as the digits of a number, the first one lowest.
+    """
+    for other in others:
+        number = places % rules[NUM_POTS]
+        places //= rules[NUM_POTS]
+        if not 0 < other < DISH or not _accepted(state, rules, other):
+            continue
+        pot = rules[AT_POTS] + POT_RECORD * number
+        if state[pot] < 0 or not accepts(state, rules, pot, other):
+            return False
+        add_to_pot(state, rules, pot, other)
+    return True
+
+
+@kernel
+def _accepted_beside(state: Vector, rules: Vector, item: int, others: Items) -> bool:
+    """Whether some pot takes an ingredient after all others have gone to pots that take them, in some way."""
+    # Not by recursion: numba's cache does not keep functions that call themselves in good order.
+    for places in range(rules[NUM_POTS] ** len(others)):
+        after = state.copy()
+        if _place_all(after, rules, others, places) and _accepted(after, rules, item):
+            return True
+    return False
 
 
 @kernel
@@ -88,7 +109,7 @@ def needed_beside(state: Vector, rules: Vector, item: int, others: Items) -> boo
     if item >= SOUP:
         return True
     if item < DISH:
-        return _accepted_beside(state, rules, item, others, 0)
+        return _accepted_beside(state, rules, item, others)
     wanted = 0
     for number in range(rules[NUM_POTS]):
         pot = rules[AT_POTS] + POT_RECORD * number

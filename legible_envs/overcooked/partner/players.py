@@ -111,7 +111,7 @@ class RecordedPartner:
     """
 
     def __init__(self, actions: npt.ArrayLike) -> None:
-        listed = as_array("`actions` of a recorded partner", actions)
+        listed = as_array(actions)
         whole = listed.ndim == 1 and listed.dtype.kind in "iuf" and bool((listed == np.floor(listed)).all())
         if not whole or (listed.size and not 0 <= listed.min() <= listed.max() <= 5):
             raise ValueError(f"`actions` of a recorded partner must be a list of actions 0..5, got {shown(actions)}")
