@@ -66,15 +66,47 @@ class Manners:
     def keep_off(self, senses: Senses, floor: Floor, belief: Mapping[str, float] | None) -> int:
         """What an idle robot does: goes off the ways of a person who is near, and stays there."""
         here, person = senses.player(PARTNER)[0], senses.player(PERSON)[0]
-        if not 0 <= int(floor.steps_from(person)[here]) <= _NEAR:
+        is_near = 0 <= int(floor.steps_from(person)[here]) <= _NEAR
+        if not is_near and not floor.depth[here]:
             return STAY
         goals, weights = self._goals(senses, floor, belief, here=-1)
         cost = floor.in_the_way(person, goals, weights)
-        if cost[here] == 0:
+        if cost[here] == 0 and not floor.depth[here]:
             return STAY
         refuge = floor.refuge(here, person, cost)
-        action = _step(floor, here, refuge, person) if cost[refuge] < cost[here] else STAY
+        is_better = cost[refuge] < cost[here] or floor.depth[refuge] < floor.depth[here]
+        action = _step(floor, here, refuge, person) if is_better else STAY
         return STAY if action is None else action
+
+    def is_kept_out(self, senses: Senses, floor: Floor, access: int, ticks: int) -> bool:
+        """Whether to stay out of a pocket: in it is the person, or they could come to its mouth too soon.
+
+        Args:
+            senses: What the robot senses.
+            floor: Of the kitchen.
+            access: Where the robot is to go.
+            ticks: How long it takes to go there and do what is to be done.
+        """
+        here, person = senses.player(PARTNER)[0], senses.player(PERSON)[0]
+        mouth, depth = int(floor.mouth[access]), int(floor.depth[access])
+        if not depth or (floor.depth[here] and floor.mouth[here] == mouth):
+            return False
+        if floor.mouth[person] == mouth:
+            return True
+        away = int(floor.steps_from(person)[mouth])
+        return 0 <= away <= ticks + depth + 1
+
+    def leave_pocket(self, senses: Senses, floor: Floor, belief: Mapping[str, float] | None) -> None:
+        """Begin to leave a pocket in time, if the person is about to come in."""
+        here, person = senses.player(PARTNER)[0], senses.player(PERSON)[0]
+        depth, mouth = int(floor.depth[here]), int(floor.mouth[here])
+        if self.is_aside or not depth or floor.mouth[person] == mouth:
+            return
+        if int(floor.steps_from(person)[mouth]) > depth + 2:
+            return
+        goals, weights = self._goals(senses, floor, belief, here=-1)
+        if floor.in_the_way(person, goals, weights)[here] > 0:
+            self._begin(senses, floor, belief)
 
     def _is_pushed(self, senses: Senses, floor: Floor, here: int, person: int) -> bool:
         """Whether the person walks against the robot."""

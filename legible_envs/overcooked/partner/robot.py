@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from legible_envs.overcooked.game.dynamics import interaction
-from legible_envs.overcooked.game.vectors import INTERACT, NOTHING_HAPPENS, STAY
+from legible_envs.overcooked.game.dynamics import interaction, pot_at
+from legible_envs.overcooked.game.vectors import COOK_TIME, DISH, INTERACT, NOTHING_HAPPENS, POT_CELL, STAY
 from legible_envs.overcooked.humans.kernels import choose_action
 from legible_envs.overcooked.partner.intent import IntentObserver
 from legible_envs.overcooked.partner.interface import PARTNER, PERSON, Command, Senses
@@ -119,34 +119,43 @@ class RobotPartner:
         self._job = choose_job(senses, floor, self._job, station, impatient=impatient)
         here = senses.player(PARTNER)[0]
         action = self._walk(senses, floor)
-        if action != INTERACT:  # a hand's turn is done before making way
+        if action != INTERACT:  # what is done with one more tick is done before making way
             action = self._give_way(senses, floor, belief, action)
+            if action < STAY and self._last == (here, action) and floor.open[floor.beside(here, action)]:
+                action = STAY  # both wanted to step on the same cell: the person goes first
         self._last = here, action
         if self._manners.is_aside or self._job.target < 0:
             return Command(action, None, belief, predicted, "yield" if self._manners.is_aside else "wait")
         return Command(action, self._names[self._job.target], belief, predicted, self._job.state)
 
-    def _walk(self, senses: Senses, floor: Floor) -> int:
-        """The next action on the way to the target: round the person, and not against them."""
+    def _walk(self, senses: Senses, floor: Floor) -> int | None:
+        """The next action on the way to the target, round the person and not against them; None where there is none."""
         here, facing, _ = senses.player(PARTNER)
         person, target = senses.player(PERSON)[0], self._job.target
         if target < 0:
-            return STAY
+            return None
         can_interact = interaction(senses.state, senses.kitchen, senses.rules, PARTNER) != NOTHING_HAPPENS
-        steps = floor.way(target, here, person)
+        steps = floor.way(target, here, person, stands=self._manners.stood >= self.hold)
+        if self._manners.stood < self.patience and steps[here] > 0:
+            ticks = int(steps[here]) + 1 + self._ticks_to_wait(senses)
+            if self._manners.is_kept_out(senses, floor, floor.access(steps, here), ticks):
+                return None
         action = int(choose_action(here, facing, target, steps, floor.height, floor.width, can_interact, 0.0))
-        if action >= STAY:
-            return action
-        there = floor.beside(here, action)
-        # Whoever wanted to step on the same cell goes first.
-        is_bump = self._last == (here, action) and there >= 0 and bool(floor.open[there])
-        return STAY if there == person or is_bump else action
+        return STAY if action < STAY and floor.beside(here, action) == person else action
 
-    def _give_way(self, senses: Senses, floor: Floor, belief: Mapping[str, float] | None, action: int) -> int:
+    def _ticks_to_wait(self, senses: Senses) -> int:
+        """How long the soup that the robot is going to take still cooks."""
+        state, rules = senses.state, senses.rules
+        if senses.kitchen[self._job.target] != POT_CELL or senses.player(PARTNER)[2] != DISH:
+            return 0
+        return max(0, int(rules[COOK_TIME] - state[pot_at(state, rules, self._job.target) + 5]))
+
+    def _give_way(self, senses: Senses, floor: Floor, belief: Mapping[str, float] | None, action: int | None) -> int:
+        self._manners.leave_pocket(senses, floor, belief)
         aside = self._manners.make_way(senses, floor, belief)
         if aside is not None:
             return aside
-        return self._manners.keep_off(senses, floor, belief) if self._job.target < 0 else action
+        return self._manners.keep_off(senses, floor, belief) if action is None else action
 
     def _sure_of(self, belief: Mapping[str, float]) -> str | None:
         most = max(belief.values())

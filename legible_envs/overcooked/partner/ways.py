@@ -18,16 +18,26 @@ Steps = npt.NDArray[np.int32]
 """``(H*W,)`` fewest moves; -1 where no path leads."""
 
 _DETOUR: Final = 4  # steps round the other player that are better than to wait until they move
+_POCKET: Final = 1e6
 
 
 class Floor:
     """Where players can walk in a kitchen, and how far it is.
 
-    Fields of steps from cells are kept: a kitchen has few goals.
+    Fields of steps from cells are kept: a kitchen has few goals. A *pocket* is a dead end one cell wide, with all that
+    branches off in it: whoever is in it cannot get out while somebody stands at its mouth.
 
     Args:
         kitchen: See :mod:`legible_envs.overcooked.game.vectors`.
         rules: See there.
+
+    Attributes:
+        height: Rows.
+        width: Columns.
+        clear: ``(H*W,)`` floor without virtual obstacles.
+        open: ``(H*W,)`` where players can stand.
+        depth: ``(H*W,)`` how deep in a pocket a cell lies; 0 outside. In a kitchen that is all dead ends there are none.
+        mouth: ``(H*W,)`` for cells in a pocket, the cell outside that leads into it; else -1.
     """
 
     def __init__(self, kitchen: Kitchen, rules: Vector) -> None:
@@ -36,6 +46,34 @@ class Floor:
         self.clear = codes == FLOOR
         self.open = (self.clear | (codes == OBSTACLE)) if rules[SOFT] else self.clear
         self._fields: dict[int, Steps] = {}
+        self.depth, self.mouth = self._find_pockets()
+
+    def _around(self, cell: int) -> list[int]:
+        """The cells beside a cell that players can stand on."""
+        beside = [self.beside(cell, direction) for direction in range(4)]
+        return [after for after in beside if after >= 0 and self.open[after]]
+
+    def _find_pockets(self) -> tuple[Steps, Steps]:
+        outside = set(np.flatnonzero(self.open).tolist())
+        ends = [cell for cell in outside if len(self._around(cell)) <= 1]
+        while ends:  # take the ends off until only what lies on rounds, and between them, is left
+            cell = ends.pop()
+            outside.discard(cell)
+            ends += [
+                after
+                for after in self._around(cell)
+                if after in outside and sum(a in outside for a in self._around(after)) == 1
+            ]
+        depth, mouth = np.zeros(len(self.open), dtype=np.int32), np.full(len(self.open), -1, dtype=np.int32)
+        front = sorted(outside)
+        while front:
+            cell = front.pop()
+            for after in self._around(cell):
+                if after not in outside and depth[after] == 0:
+                    depth[after] = depth[cell] + 1
+                    mouth[after] = mouth[cell] if depth[cell] else cell
+                    front.append(after)
+        return depth, mouth
 
     def steps_from(self, cell: int, without: int = -1) -> Steps:
         """Fewest moves from a cell, which need not be floor, over the floor without one cell."""
@@ -51,8 +89,15 @@ class Floor:
             self._fields[cell] = steps
         return steps
 
-    def way(self, goal: int, here: int, other: int) -> Steps:
-        """Fewest moves from a goal on a good way from ``here``: clear of obstacles where that can be, round the other."""
+    def way(self, goal: int, here: int, other: int, *, stands: bool) -> Steps:
+        """Fewest moves from a goal on a good way from ``here``: round the other player, and clear of obstacles.
+
+        Args:
+            goal: Cell of the goal.
+            here: Where the way begins.
+            other: Where the other player is.
+            stands: Whether they stand there for good, so that every detour is better than to wait.
+        """
         direct = np.empty(len(self.open), dtype=np.int32)
         steps_from(np.array([goal]), self.clear, self.height, self.width, direct)
         floor = self.clear
@@ -62,7 +107,7 @@ class Floor:
         around_floor[other] = False
         around = np.empty_like(direct)
         steps_from(np.array([goal]), around_floor, self.height, self.width, around)
-        return around if 0 <= around[here] <= direct[here] + _DETOUR else direct
+        return around if around[here] >= 0 and (stands or around[here] <= direct[here] + _DETOUR) else direct
 
     def beside(self, cell: int, direction: int) -> int:
         """The cell next to a cell; -1 outside the kitchen."""
@@ -93,6 +138,12 @@ class Floor:
             found = True
         return found
 
+    def access(self, steps: Steps, here: int) -> int:
+        """The cell beside the goal at which a shortest way from ``here`` ends."""
+        while steps[here] > 1:
+            here = min((after for after in self._around(here) if steps[after] >= 0), key=lambda after: steps[after])
+        return here
+
     def refuge(self, here: int, walker: int, cost: npt.NDArray[np.float64]) -> int:
         """Where to step aside: the nearest of the cells that cost least and are not behind the walker.
 
@@ -101,9 +152,10 @@ class Floor:
         Args:
             here: Where the one who steps aside stands.
             walker: Where the other one stands.
-            cost: ``(H*W,)`` of each cell, as :meth:`in_the_way` gives it.
+            cost: ``(H*W,)`` of each cell, as :meth:`in_the_way` gives it. Pockets cost more than all else.
         """
         steps = self.steps_from(here, without=walker)
+        cost = cost + _POCKET * (self.depth > 0)
         cells = np.flatnonzero(steps >= 0)
         least = float(cost[cells].min())
         best = cells[cost[cells] <= least + 1e-12]
