@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any, Literal
 
@@ -470,7 +471,11 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
 
     def view(self) -> GameView:
         """A snapshot of the game in words, for drawing."""
-        return make_view(self._packed.layout, self._state, self._rules, self.settings.rules)
+        view = make_view(self._packed.layout, self._state, self._rules, self.settings.rules)
+        if self._team is None or not self._team.has_robot:
+            return view
+        person, robot = view.players
+        return replace(view, players=(person, replace(robot, is_robot=True)))
 
     def arrays(self) -> tuple[Vector, Kitchen, Vector]:
         """The game's ``(state, kitchen, rules)`` as described in ``vectors``; not copies, to be read only."""

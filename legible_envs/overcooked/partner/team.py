@@ -167,7 +167,7 @@ class Team:
         self._kitchen, self._rules = game.kitchen.copy(), game.rules.copy()
         self._reaches = [ReachLog(game.layout, self._place(game, number)[0]) for number in (PERSON, PARTNER)]
         self._works = True
-        if isinstance(self.partner, RobotPartner):
+        if self.has_robot:
             self.partner.reset(game.layout, rules, rng)
         else:
             try:
@@ -176,6 +176,11 @@ class Team:
                 self._works = False
                 self._report(error)
         self._sense(game, None)
+
+    @property
+    def has_robot(self) -> bool:
+        """Whether the partner is a robot, not another person."""
+        return isinstance(self.partner, RobotPartner)
 
     @property
     def action(self) -> int:

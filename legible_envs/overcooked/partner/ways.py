@@ -24,8 +24,8 @@ _POCKET: Final = 1e6
 class Floor:
     """Where players can walk in a kitchen, and how far it is.
 
-    Fields of steps from cells are kept: a kitchen has few goals. A *pocket* is a dead end one cell wide, with all that
-    branches off in it: whoever is in it cannot get out while somebody stands at its mouth.
+    Fields of steps from cells are kept: a kitchen has few goals. A *pocket* is a dead end one cell wide, up to where
+    ways part: whoever is in it cannot get out while somebody stands at its mouth.
 
     Args:
         kitchen: See :mod:`legible_envs.overcooked.game.vectors`.
@@ -36,7 +36,7 @@ class Floor:
         width: Columns.
         clear: ``(H*W,)`` floor without virtual obstacles.
         open: ``(H*W,)`` where players can stand.
-        depth: ``(H*W,)`` how deep in a pocket a cell lies; 0 outside. In a kitchen that is all dead ends there are none.
+        depth: ``(H*W,)`` how deep in a pocket a cell lies; 0 outside.
         mouth: ``(H*W,)`` for cells in a pocket, the cell outside that leads into it; else -1.
     """
 
@@ -54,25 +54,15 @@ class Floor:
         return [after for after in beside if after >= 0 and self.open[after]]
 
     def _find_pockets(self) -> tuple[Steps, Steps]:
-        outside = set(np.flatnonzero(self.open).tolist())
-        ends = [cell for cell in outside if len(self._around(cell)) <= 1]
-        while ends:  # take the ends off until only what lies on rounds, and between them, is left
-            cell = ends.pop()
-            outside.discard(cell)
-            ends += [
-                after
-                for after in self._around(cell)
-                if after in outside and sum(a in outside for a in self._around(after)) == 1
-            ]
         depth, mouth = np.zeros(len(self.open), dtype=np.int32), np.full(len(self.open), -1, dtype=np.int32)
-        front = sorted(outside)
-        while front:
-            cell = front.pop()
-            for after in self._around(cell):
-                if after not in outside and depth[after] == 0:
-                    depth[after] = depth[cell] + 1
-                    mouth[after] = mouth[cell] if depth[cell] else cell
-                    front.append(after)
+        ends = [cell for cell in np.flatnonzero(self.open).tolist() if len(self._around(cell)) == 1]
+        for end in ends:
+            chain, cell = [end], self._around(end)[0]
+            while len(beside := self._around(cell)) == 2:
+                chain.append(cell)
+                cell = next(after for after in beside if after != chain[-2])
+            if len(beside) > 2:
+                depth[chain], mouth[chain] = np.arange(len(chain), 0, -1), cell
         return depth, mouth
 
     def steps_from(self, cell: int, without: int = -1) -> Steps:
