@@ -40,8 +40,8 @@ class ScriptedPlayer:
     ``obs_type``, under wrappers, and in vector environments.
 
     In a game of several players it gives way: who cannot step on a cell because somebody else is there, or wants to be,
-    goes away from them for a few steps every other time. Two who walk by shortest paths would else block each other for
-    ever.
+    goes away from them for a few steps every other time, and who has no goal strolls about. Two who walk by shortest
+    paths would else block each other for ever.
 
     Args:
         env: An environment made by ``gymnasium.make("LegibleOvercooked-v0")``, or a vector environment of such.
@@ -175,8 +175,8 @@ class ScriptedPlayer:
     def _go_away(self, index: int, arrays: tuple[Vector, Kitchen, Vector], idle: bool) -> int:
         """A step away from the other players, where one is due; else -1.
 
-        It is due every other time to a player who was kept from the last step, or has no goal and stands beside
-        somebody.
+        It is due every other time to a player who was kept from the last step. One who has no goal strolls about, so as
+        not to stand for good where somebody else has to be.
         """
         state, kitchen, rules = arrays
         cell = self._place(arrays)[0]
@@ -185,17 +185,19 @@ class ScriptedPlayer:
         beside = [int(neighbour(cell, direction, self._height, self._width)) for direction in range(4)]
         before, action = self._last[index]
         kept = before == cell and action < STAY and beside[action] >= 0 and bool(floor[beside[action]])
-        is_due = kept or (idle and any(after in others for after in beside))
-        if self._retreat[index] == 0 and is_due and self.rng.random() < 0.5:
+        if self._retreat[index] == 0 and kept and self.rng.random() < 0.5:
             self._retreat[index] = int(self.rng.integers(1, self._height + self._width))
-        if self._retreat[index] == 0:
+        strolls = idle and self._retreat[index] == 0 and self.rng.random() < 0.5
+        if self._retreat[index] == 0 and not strolls:
             return -1
-        self._retreat[index] -= 1
-        away = np.empty(len(floor), dtype=np.int32)
-        steps_from(others, floor, self._height, self._width, away)
         free = [d for d, after in enumerate(beside) if after >= 0 and floor[after] and after not in others]
-        most = max((int(away[beside[d]]) for d in free), default=-1)
-        return int(self.rng.choice([d for d in free if away[beside[d]] == most])) if free else STAY
+        if not strolls:
+            self._retreat[index] -= 1
+            away = np.empty(len(floor), dtype=np.int32)
+            steps_from(others, floor, self._height, self._width, away)
+            most = max((int(away[beside[d]]) for d in free), default=-1)
+            free = [d for d in free if away[beside[d]] == most]
+        return int(self.rng.choice(free)) if free else STAY
 
     def _approach(self, index: int, arrays: tuple[Vector, Kitchen, Vector], can_interact: bool) -> int:
         """The next action on the path to a game's goal; INTERACT uses it."""

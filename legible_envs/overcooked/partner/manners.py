@@ -31,6 +31,7 @@ class Manners:
         self._person_at = -1
         self._refuge = -1
         self._left = 0
+        self._kept = 0
 
     @property
     def is_aside(self) -> bool:
@@ -70,6 +71,8 @@ class Manners:
         if not is_near and not floor.depth[here]:
             return STAY
         goals, weights = self._goals(senses, floor, belief, here=-1)
+        if floor.depth[person]:  # they have to get out again
+            goals, weights = [*goals, int(floor.mouth[person])], [*weights, 1.0]
         cost = floor.in_the_way(person, goals, weights)
         if cost[here] == 0 and not floor.depth[here]:
             return STAY
@@ -78,7 +81,7 @@ class Manners:
         action = _step(floor, here, refuge, person) if is_better else STAY
         return STAY if action is None else action
 
-    def is_kept_out(self, senses: Senses, floor: Floor, access: int, ticks: int) -> bool:
+    def is_kept_out(self, senses: Senses, floor: Floor, access: int, ticks: int, patience: int) -> bool:
         """Whether to stay out of a pocket: in it is the person, or they could come to its mouth too soon.
 
         Args:
@@ -86,15 +89,20 @@ class Manners:
             floor: Of the kitchen.
             access: Where the robot is to go.
             ticks: How long it takes to go there and do what is to be done.
+            patience: After so many ticks, only a person who goes for something in the pocket is waited for.
         """
         here, person = senses.player(PARTNER)[0], senses.player(PERSON)[0]
         mouth, depth = int(floor.mouth[access]), int(floor.depth[access])
         if not depth or (floor.depth[here] and floor.mouth[here] == mouth):
+            self._kept = 0
             return False
+        self._kept += 1
         if floor.mouth[person] == mouth:
             return True
-        away = int(floor.steps_from(person)[mouth])
-        return 0 <= away <= ticks + depth + 1
+        if not 0 <= int(floor.steps_from(person)[mouth]) <= ticks + depth + 1:
+            return False
+        goals = np.flatnonzero(senses.person_goals).tolist()
+        return self._kept <= patience or floor.in_the_way(person, goals, [1.0] * len(goals))[access] > 0
 
     def leave_pocket(self, senses: Senses, floor: Floor, belief: Mapping[str, float] | None) -> None:
         """Begin to leave a pocket in time, if the person is about to come in."""

@@ -136,9 +136,9 @@ class RobotPartner:
             return None
         can_interact = interaction(senses.state, senses.kitchen, senses.rules, PARTNER) != NOTHING_HAPPENS
         steps = floor.way(target, here, person, stands=self._manners.stood >= self.hold)
-        if self._manners.stood < self.patience and steps[here] > 0:
+        if steps[here] > 0:
             ticks = int(steps[here]) + 1 + self._ticks_to_wait(senses)
-            if self._manners.is_kept_out(senses, floor, floor.access(steps, here), ticks):
+            if self._manners.is_kept_out(senses, floor, floor.access(steps, here), ticks, self.patience):
                 return None
         action = int(choose_action(here, facing, target, steps, floor.height, floor.width, can_interact, 0.0))
         return STAY if action < STAY and floor.beside(here, action) == person else action
