@@ -25,7 +25,7 @@ from legible_envs.overcooked.partner.players import (
 from legible_envs.overcooked.partner.reaches import ReachLog
 from legible_envs.overcooked.partner.robot import RobotPartner
 from legible_envs.overcooked.settings import read_action
-from legible_envs.partner.fluency import TeamMetrics, Tick, known_measures
+from legible_envs.partner.fluency import ReachPrediction, TeamMetrics, Tick, known_measures
 from legible_envs.support.plugins import import_target
 from legible_envs.support.validation import shown
 
@@ -225,6 +225,11 @@ class Team:
     def summary(self) -> dict[str, float]:
         """Measures of the team so far, see :meth:`~legible_envs.partner.fluency.TeamMetrics.summary`."""
         return self._metrics.summary()
+
+    @property
+    def predictions(self) -> tuple[ReachPrediction, ...]:
+        """How the partner predicted each reach that ended at a station."""
+        return tuple(self._metrics.predictions)
 
     def info(self, layout: OvercookedLayout) -> dict[str, Any]:
         """The part of ``info`` about belief and partner; ``inf`` where a measure is not known yet."""
