@@ -89,7 +89,8 @@ class Manners:
             floor: Of the kitchen.
             access: Where the robot is to go.
             ticks: How long it takes to go there and do what is to be done.
-            patience: After so many ticks, only a person who goes for something in the pocket is waited for.
+            patience: After so many ticks, only a person who goes for something in the pocket is waited for; none who
+                stood still for so long.
         """
         here, person = senses.player(PARTNER)[0], senses.player(PERSON)[0]
         mouth, depth = int(floor.mouth[access]), int(floor.depth[access])
@@ -99,7 +100,7 @@ class Manners:
         self._kept += 1
         if floor.mouth[person] == mouth:
             return True
-        if not 0 <= int(floor.steps_from(person)[mouth]) <= ticks + depth + 1:
+        if self.stood > patience or not 0 <= int(floor.steps_from(person)[mouth]) <= ticks + depth + 1:
             return False
         goals = np.flatnonzero(senses.person_goals).tolist()
         return self._kept <= patience or floor.in_the_way(person, goals, [1.0] * len(goals))[access] > 0

