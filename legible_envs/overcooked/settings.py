@@ -100,8 +100,8 @@ class KitchenSettings:
         self.num_players = integer("num_players", num_players, 1, MAX_PLAYERS, whole_floats=True)
         if has_partner and self.num_players > 1:
             raise ValueError(
-                f"with `partner` the agent is one of two players, so `num_players` must be 1, got {num_players}; or leave "
-                "`partner` out and control all players"
+                f"with `partner` the agent is one of two players, so `num_players` must be 1, got {num_players}; or "
+                "leave `partner` out and control all players"
             )
         self.num_agents = self.num_players
         """Players that an environment's actions and observations are of."""

@@ -29,8 +29,8 @@ TICK: Final = 0.15
 class Senses:
     """All that a partner knows when it decides. Arrays are copies; cells in ``state`` are flat, ``row * width + col``.
 
-    A *reach* is a trajectory as :mod:`legible_envs.overcooked.trajectories` defines it: it begins when the person empties
-    the hands at a pot or serving station, and ends when an ingredient or dish station fills them.
+    A *reach* is a trajectory as :mod:`legible_envs.overcooked.trajectories` defines it: it begins when the person
+    empties the hands at a pot or serving station, and ends when an ingredient or dish station fills them.
 
     Attributes:
         time: Seconds since the episode began.
@@ -38,8 +38,8 @@ class Senses:
         state: The game; see :mod:`legible_envs.overcooked.game.vectors`.
         kitchen: See there.
         rules: See there.
-        reach: ``(k, 2)`` row and column of the person since the reach began, oldest first, consecutive repeats left out;
-            ``k = 0`` where there is no reach.
+        reach: ``(k, 2)`` row and column of the person since the reach began, oldest first, consecutive repeats left
+            out; ``k = 0`` where there is no reach.
         times: ``(k,)`` seconds since the episode began when the person came to each of them.
         reach_number: How many reaches have begun; a change tells that ``reach`` is another one.
         start: Station where the reach began, None where there is no reach.

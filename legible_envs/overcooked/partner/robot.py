@@ -53,13 +53,15 @@ class RobotPartner:
     **Ways.** It walks by shortest paths round the person, and lets them go first where both want to step on a cell. When
     they walk against it, or stand before it for ``hold`` ticks without another way to any of their goals, it steps
     aside: to the nearest cell that lies on no shortest path of theirs, or back to where one branches off. While it
-    waits it keeps off these paths, too, so that it blocks no doorway for long.
+    waits it keeps off these paths, too, so that it blocks no doorway for long; and it does not go into a dead end one
+    cell wide while the person could soon stand at its mouth. What it cannot help: a person who stands for good where it
+    has to pass, or walks against it for good in a kitchen without a way round.
 
     All of it is deterministic.
 
     Args:
-        predictor: Predicts what the person fetches: None or ``"bayesian"`` for the built-in Bayesian goal inference, the
-            name of another predictor, ``"module:Class"``, or a predictor; see
+        predictor: Predicts what the person fetches: None or ``"bayesian"`` for the built-in Bayesian goal inference,
+            the name of another predictor, ``"module:Class"``, or a predictor; see
             :class:`~legible_envs.overcooked.partner.intent.IntentObserver`. Where it fails the robot is not sure, and
             the episode goes on.
         threshold: Probability that a goal must exceed, 0 to 1. 0: it goes by whatever goal is most probable (of tied
