@@ -50,8 +50,8 @@ class RobotPartner:
     yield     steps aside for the person                      they have passed, or after ``hold`` ticks
     ========  ==============================================  ==========================================================
 
-    **Ways.** It walks by shortest paths round the person, and lets them go first where both want to step on a cell. When
-    they walk against it, or stand before it for ``hold`` ticks without another way to any of their goals, it steps
+    **Ways.** It walks by shortest paths round the person, and lets them go first where both want to step on a cell.
+    When they walk against it, or stand before it for ``hold`` ticks without another way to any of their goals, it steps
     aside: to the nearest cell that lies on no shortest path of theirs, or back to where one branches off. While it
     waits it keeps off these paths, too, so that it blocks no doorway for long; and it does not go into a dead end one
     cell wide while the person could soon stand at its mouth. What it cannot help: a person who stands for good where it
