@@ -129,10 +129,9 @@ def team_table(teams: pd.DataFrame) -> pd.DataFrame:
             values = means[measure].dropna().to_numpy(dtype=np.float64)
             if not len(values):
                 continue
-            spread = float(values.std(ddof=1)) if len(values) > 1 else np.nan
-            reach = (
-                float(stats.t.ppf(0.975, len(values) - 1)) * spread / np.sqrt(len(values)) if len(values) > 1 else 0.0
-            )
+            reach = np.nan  # one kitchen says nothing about others
+            if len(values) > 1:
+                reach = float(stats.t.ppf(0.975, len(values) - 1) * values.std(ddof=1) / np.sqrt(len(values)))
             mean = float(values.mean())
             row = {"walker": walker, "robot": robot, "measure": measure, "condition": condition, "layouts": len(values)}
             rows.append(row | {"mean": mean, "low": mean - reach, "high": mean + reach})
