@@ -26,7 +26,7 @@ ROBOTS: Final = (
     PredictorSetting("Eq. 1 (hard)", "bayesian", {"costs": "hard"}),
     PredictorSetting("Eq. 1 (soft)", "bayesian", {"costs": "soft"}),
     PredictorSetting("Eq. 1 (IRL costs)", "bayesian", {"cell_costs": "learned"}),
-    PredictorSetting("no prediction", "uniform"),
+    PredictorSetting("no prediction", "predictors.uniform:UniformPredictor"),
 )
 """How robots predict; costs are learned from simulated participants in the same kitchen."""
 
