@@ -25,6 +25,7 @@ def test_every_robot_meets_the_same_participants() -> None:
     assert trials[0]["seed"] != trials_of("Efficient")[0]["seed"] != trials_of("Efficient", 1)[0]["seed"]
 
 
+@pytest.mark.slow
 def test_what_is_logged_becomes_a_table_and_words() -> None:
     rows = []
     for condition in CONDITIONS:
@@ -42,7 +43,9 @@ def test_what_is_logged_becomes_a_table_and_words() -> None:
     steps = table[table["measure"] == "steps"].set_index(["robot", "condition"])
     own = logged[(logged["robot"] == teams.ALONE) & (logged["condition"] == "Random")]
     assert steps.loc[(teams.ALONE, "Random"), "mean"] == pytest.approx(own["steps"].mean())
-    assert (table["low"] <= table["mean"]).all()
+    known = table.dropna()
+    assert len(known) > 0.8 * len(table)  # an interval needs two kitchens in which there was something to predict
+    assert (known["low"] <= known["mean"]).all()
     # in an open room two cook faster than one
     assert (steps["mean"].loc["Eq. 1 (hard)"] < steps["mean"].loc[teams.ALONE]).all()
     wide = teams.wide_table(table)
