@@ -30,6 +30,7 @@ from legible_envs.overcooked.trajectories import trajectories_from_states
 from legible_envs.rollouts.trajectory import Trajectory
 from legible_envs.support.per_env import own_entry
 from legible_envs.support.specs import JsonSpec, check_options
+from legible_envs.support.validation import real
 
 __all__ = ["OvercookedEnv"]
 
@@ -251,6 +252,7 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
             has_partner=partner is not None,
             rules=rules,
         )
+        threshold = real("threshold", threshold, 0, 1)
         if partner is None and predictor is not None:
             raise ValueError("`predictor` is for partner='robot'; there is no partner")
         self._team = None if partner is None else Team(make_partner(partner, predictor, threshold))

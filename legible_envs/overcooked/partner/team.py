@@ -87,8 +87,8 @@ def _make_kind(spec: Mapping[Any, Any], predictor: object, threshold: float) -> 
     kind = arguments.pop("kind", "robot")
     if not isinstance(kind, str) or kind not in _KINDS:
         raise ValueError(
-            f"no partner named {shown(kind)}; there are {', '.join(_KINDS)}; or use 'module:Class', an object with "
-            "`reset` and `step`, or a policy"
+            f"`partner`: no partner named {shown(kind)}; there are {', '.join(_KINDS)}; or use 'module:Class', an "
+            "object with `reset` and `step`, or a policy"
         )
     if kind == "robot":
         arguments = {"predictor": predictor, "threshold": threshold, **arguments}
