@@ -30,6 +30,8 @@ def register_environments() -> None:
             vector_entry_point="legible_envs.tabletop.vector_env:TabletopVectorEnv",
             max_episode_steps=1800,
         )
+    if "LegibleDesign-v0" not in registry:
+        register(id="LegibleDesign-v0", entry_point="legible_envs.design_game.env:DesignEnv")
 
 
 register_environments()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Final
 
+from legible_envs.subtasks import AGENTS
 from legible_envs.support.models import Length, OneOrMore, Text, Whole, YamlModel
 from legible_envs.task_states import MAX_SUBTASKS
 
@@ -27,6 +28,7 @@ class SubtaskEntry(YamlModel):
     after: Names = []
     then: Names = []
     count: Annotated[int, Whole(1, MOST_COPIES)] = 1
+    agents: Annotated[list[Name], Length(1, MOST_NAMES), OneOrMore()] = list(AGENTS)
 
 
 class TaskContent(YamlModel):

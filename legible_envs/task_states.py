@@ -2,6 +2,8 @@
 
 Valid sequences are counted and weighted without listing any. Interchangeable subtasks are counted, not named, which
 keeps states few: three soups have 7,484,400 sequences and 339 states.
+
+A step that only a robot can make changes what is done and leaves the person where they are.
 """
 
 from __future__ import annotations
@@ -11,11 +13,12 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from legible_envs.errors import TaskError
+from legible_envs.subtasks import AGENTS, HUMAN
 
 __all__ = ["StateSpace", "SubtaskClass"]
 
@@ -40,6 +43,7 @@ class SubtaskClass:
         count: Number of copies.
         predecessors: Indices of classes that must be complete before.
         group: The exclusive group it belongs to, or None.
+        agents: Who can perform it.
     """
 
     goals: tuple[str, ...]
@@ -47,11 +51,17 @@ class SubtaskClass:
     count: int
     predecessors: tuple[int, ...]
     group: int | None
+    agents: tuple[str, ...] = AGENTS
 
     @property
-    def place_after(self) -> str:
-        """Where the person is afterwards; at the first of the goals where these differ."""
-        return self.then[-1] if self.then else self.goals[0]
+    def is_persons(self) -> bool:
+        """Whether it is the person's step: whether they can perform it."""
+        return HUMAN in self.agents
+
+    @property
+    def endings(self) -> tuple[tuple[str, str], ...]:
+        """Ways to perform a copy, each equally likely: the goal, and where the person is then; none of the robot's."""
+        return tuple((goal, self.then[-1] if self.then else goal) for goal in self.goals) if self.is_persons else ()
 
 
 @dataclass(slots=True)
@@ -71,6 +81,20 @@ class _Standing:
     places: dict[str, None]
 
 
+class _Odds(NamedTuple):
+    """What may follow where so much is done.
+
+    Attributes:
+        goals: The person's valid goals, sorted by name.
+        steps: ``(class, goal, probability, next state)`` of each step of the person.
+        robots: ``(probability, done afterwards)`` of each step of the robot; the person stays where they are.
+    """
+
+    goals: tuple[str, ...]
+    steps: list[tuple[int, str, float, State]]
+    robots: list[tuple[float, tuple[int, ...]]]
+
+
 class StateSpace:
     """All states a task can pass through.
 
@@ -88,6 +112,7 @@ class StateSpace:
         self.max_open = max_open
         self.initial: State = ((0,) * len(self.classes), start)
         self.length = sum(cls.count for cls in self.classes)
+        self._endings = [cls.endings for cls in self.classes]
 
     @property
     def num_sequences(self) -> int:
@@ -112,15 +137,20 @@ class StateSpace:
             and not (full and cls.group is not None and cls.group not in is_open)
         ]
 
-    def steps(self, state: State) -> list[tuple[int, str, float, State]]:
-        """``(class, goal, copies, next state)`` of every step that precedence allows; goals share the copies."""
-        done, _ = state
-        steps = []
+    def steps(self, state: State) -> list[tuple[int, str | None, float, State]]:
+        """``(class, goal, copies, next state)`` of every step that precedence allows; goals share the copies.
+
+        The goal of a step that is the robot's is None: it matters to nobody which of several it takes.
+        """
+        done, place = state
+        steps: list[tuple[int, str | None, float, State]] = []
         for i in self.ready(done):
-            cls = self.classes[i]
-            for goal in cls.goals:
-                following = (_with_one_more(done, i), cls.then[-1] if cls.then else goal)
-                steps.append((i, goal, (cls.count - done[i]) / len(cls.goals), following))
+            endings, following = self._endings[i], _with_one_more(done, i)
+            left = self.classes[i].count - done[i]
+            if endings:
+                steps += [(i, goal, left / len(endings), (following, there)) for goal, there in endings]
+            else:
+                steps.append((i, None, float(left), (following, place)))
         return steps
 
     # -- what is done --------------------------------------------------------------------------------------------------
@@ -138,16 +168,16 @@ class StateSpace:
         layer = {done: self._standing(done, tuple(i for i, c in enumerate(self.classes) if not c.predecessors))}
         layer[done].places[start] = None
         found, steps = dict(layer), 0
-        places = [dict.fromkeys(cls.then[-1:] or cls.goals) for cls in self.classes]
-        num_goals = [len(cls.goals) for cls in self.classes]
+        places = [dict.fromkeys(place for _, place in endings) for endings in self._endings]
+        num_steps = [len(endings) or 1 for endings in self._endings]
         for _ in range(self.length):
             following: dict[tuple[int, ...], _Standing] = {}
             for standing in layer.values():
                 for i, then in zip(standing.ready, standing.following, strict=True):
-                    steps += len(standing.places) * num_goals[i]
+                    steps += len(standing.places) * num_steps[i]
                     if then not in following:
                         following[then] = self._standing(then, self._free_after(standing.free, then, i))
-                    following[then].places.update(places[i])
+                    following[then].places.update(places[i] or standing.places)
                 if steps > MAX_STEPS or len(found) + len(following) > MAX_DONE:
                     raise TaskError(_too_large("too many task states"))
             found |= following
@@ -219,14 +249,15 @@ class StateSpace:
     # -- sequences -----------------------------------------------------------------------------------------------------
 
     def sample(self, rng: np.random.Generator) -> list[tuple[str, tuple[str, ...], str, tuple[str, ...]]]:
-        """``(place, valid goals, goal, places afterwards)`` of every step of a uniformly random valid sequence."""
+        """``(place, valid goals, goal, places afterwards)`` of the person's steps in a random valid sequence."""
         completions, state, sequence = self.completions, self.initial, []
         for _ in range(self.length):
             steps = [step for step in self.steps(state) if completions[step[3][0]]]
             odds = [copies * (completions[then[0]] / completions[state[0]]) for _, _, copies, then in steps]
             i, goal, _, following = steps[rng.choice(len(steps), p=np.array(odds) / sum(odds))]
-            goals = tuple(sorted({step[1] for step in steps}))
-            sequence.append((state[1], goals, goal, self.classes[i].then))
+            if goal is not None:
+                goals = tuple(sorted({step[1] for step in steps if step[1] is not None}))
+                sequence.append((state[1], goals, goal, self.classes[i].then))
             state = following
         return sequence
 
@@ -236,42 +267,47 @@ class StateSpace:
         layer: dict[State, float] = {self.initial: 1.0}
         for _ in range(self.length):
             visits: dict[State, float] = defaultdict(float)
-            odds_of: dict[tuple[int, ...], tuple[tuple[str, ...], list[tuple[int, str, float, State]]]] = {}
+            odds_of: dict[tuple[int, ...], _Odds] = {}
             for (done, place), visit in layer.items():
                 if done not in odds_of:
                     odds_of[done] = self._odds(done)
-                goals, steps = odds_of[done]
+                goals, steps, robots = odds_of[done]
                 for i, goal, probability, following in steps:
                     visits[following] += visit * probability
                     weights[place, goals, goal, self.classes[i].then] += visit * probability
+                for probability, then in robots:
+                    visits[then, place] += visit * probability
             layer = visits
         return dict(weights)
 
-    def _odds(self, done: tuple[int, ...]) -> tuple[tuple[str, ...], list[tuple[int, str, float, State]]]:
-        """Valid goals where so much is done, and ``(class, goal, probability, next state)`` of every step."""
-        completions, standing = self.completions, self._standings[done]
-        total, steps = completions[done], []
+    def _odds(self, done: tuple[int, ...]) -> _Odds:
+        completions, standing, total = self.completions, self._standings[done], self.completions[done]
+        steps: list[tuple[int, str, float, State]] = []
+        robots: list[tuple[float, tuple[int, ...]]] = []
         for i, then in zip(standing.ready, standing.following, strict=True):
             if not completions[then]:
                 continue
-            cls = self.classes[i]
-            for goal in cls.goals:
-                # Python ints stay exact however long the task; only their quotient is a float.
-                probability = (cls.count - done[i]) / len(cls.goals) * (completions[then] / total)
-                steps.append((i, goal, probability, (then, cls.then[-1] if cls.then else goal)))
-        return tuple(sorted({step[1] for step in steps})), steps
+            endings, left = self._endings[i], self.classes[i].count - done[i]
+            # Python ints stay exact however long the task; only their quotient is a float.
+            share = left / (len(endings) or 1) * (completions[then] / total)
+            for goal, place in endings:
+                steps.append((i, goal, share, (then, place)))
+            if not endings:
+                robots.append((share, then))
+        return _Odds(tuple(sorted({step[1] for step in steps})), steps, robots)
 
 
 def _steps_between(classes: Sequence[SubtaskClass]) -> int:
     """Number of steps between states of classes that may be done in any order, all else being as it is.
 
     Of all ways to have done some copies, those in which a place was passed and a class is unfinished are counted as
-    those in which the class is unfinished less those in which nothing that leads to the place was done.
+    those in which the class is unfinished less those in which nothing that leads to the place was done. The robot's
+    steps lead the person nowhere.
     """
     whole = math.prod(cls.count + 1 for cls in classes)
     leading: dict[str, list[int]] = defaultdict(list)
     for i, cls in enumerate(classes):
-        for place in set(cls.then[-1:] or cls.goals):
+        for place in {place for _, place in cls.endings}:
             leading[place].append(i)
     unfinished = [whole // (cls.count + 1) * cls.count for cls in classes]
     steps = 0
@@ -279,7 +315,7 @@ def _steps_between(classes: Sequence[SubtaskClass]) -> int:
         none = whole // math.prod(classes[i].count + 1 for i in there)
         for i, cls in enumerate(classes):
             without = none if i in there else none // (cls.count + 1) * cls.count
-            steps += len(cls.goals) * (unfinished[i] - without)
+            steps += (len(cls.endings) or 1) * (unfinished[i] - without)
         if steps > MAX_STEPS:
             break
     return steps

@@ -4,6 +4,10 @@ A person executing a task reaches for one goal after another. A *stage* is the p
 goal, and the set of goals that are valid then. Eq. 3 of Tung et al. (HRI 2024) sums the legibility of every reach over
 all valid orderings of the subtasks. That sum only needs, for every stage, how often a uniformly random valid ordering
 visits it. Dynamic programming over task states gives these weights without listing a single ordering.
+
+In a heterogeneous team some subtasks are beyond the person or beyond the robot (``Subtask(agents=...)``). A valid
+sequence still orders all of them; each step of it is one of the person's if they can perform the subtask, else one of
+the robot's. Stages are those of the person's steps alone.
 """
 
 from __future__ import annotations
@@ -18,83 +22,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from legible_envs.errors import TaskError
+from legible_envs.subtasks import AGENTS, HUMAN, Stage, Subtask, Transition, names_in
 from legible_envs.support.names import is_whole
 from legible_envs.support.text import dump_yaml, read_source
-from legible_envs.support.validation import entries, integer, shown
+from legible_envs.support.validation import choice, entries, integer, shown
 from legible_envs.task_states import MAX_SUBTASKS, StateSpace, SubtaskClass
 
 if TYPE_CHECKING:
     import networkx as nx
     import numpy as np
 
-__all__ = ["Stage", "Subtask", "TaskGraph", "Transition"]
-
-
-@dataclass(frozen=True, slots=True)
-class Subtask:
-    """One step of a task: reach one of ``goals``, then pass through ``then``.
-
-    Attributes:
-        name: Unique name within the task.
-        goals: Goals any one of which fulfils the subtask (each equally likely where there are several).
-        after: Names of subtasks that must be complete before this one may begin.
-        then: Places visited after the goal, in order; the person is at the last of them afterwards. Empty means the
-            person stays at the goal.
-        count: Number of interchangeable copies, all of which have to be done.
-    """
-
-    name: str
-    goals: tuple[str, ...]
-    after: tuple[str, ...] = ()
-    then: tuple[str, ...] = ()
-    count: int = 1
-
-    def __post_init__(self) -> None:
-        for attribute in ("goals", "after", "then"):
-            value = getattr(self, attribute)
-            object.__setattr__(self, attribute, _names(f"subtask {self.name!r}: `{attribute}`", value))
-        if not isinstance(self.name, str) or not self.name or not is_whole(self.name):
-            raise TaskError(f"a subtask needs a non-empty name of whole characters, got {self.name!r}")
-        if not self.goals:
-            raise TaskError(f"subtask {self.name!r} has no goals; give at least one")
-        if len(set(self.goals)) != len(self.goals):
-            raise TaskError(f"subtask {self.name!r} names a goal twice: {self.goals}")
-        count = integer(f"subtask {self.name!r}: `count`", self.count, 1, error=TaskError)
-        object.__setattr__(self, "count", count)
-
-
-@dataclass(frozen=True, slots=True)
-class Stage:
-    """One point of the task's execution.
-
-    Attributes:
-        start: Where the person is.
-        goals: Goals that are valid next, sorted by name.
-        weight: Expected number of visits in a uniformly random valid sequence.
-    """
-
-    start: str
-    goals: tuple[str, ...]
-    weight: float
-
-
-@dataclass(frozen=True, slots=True)
-class Transition:
-    """A stage together with the goal chosen next and the places passed afterwards.
-
-    Attributes:
-        start: Where the person is.
-        goals: Goals that are valid next, sorted by name.
-        goal: The goal that is reached.
-        then: Places visited after the goal, in order.
-        weight: Expected number of such transitions in a uniformly random valid sequence.
-    """
-
-    start: str
-    goals: tuple[str, ...]
-    goal: str
-    then: tuple[str, ...]
-    weight: float
+__all__ = ["AGENTS", "Stage", "Subtask", "TaskGraph", "Transition"]
 
 
 @dataclass(frozen=True)
@@ -104,6 +42,15 @@ class TaskGraph:
     A *valid sequence* orders all copies of all subtasks so that each comes after everything it waits for and never
     more than ``max_open`` groups are begun but unfinished. Copies count as distinct, as in the paper's appendix.
 
+    Legibility is about what the person may do next. Where subtasks name who can perform them, a step of a sequence is
+    the *person's* if they can perform the subtask, and the *robot's* if only the robot can. What both can perform
+    counts as the person's: they may do it next, so an observer has to reckon with it, and the robot takes it only
+    after it has predicted that the person goes elsewhere. A stage is visited before each step of the person. Its goals
+    are those of all subtasks that are valid then and that the person can perform; its start is where their last step
+    ended. A step of the robot moves no person and visits no stage; it is done, and what waits for it may follow.
+    Sequences, and so weights, are those of the whole task: ``num_sequences``, precedence, groups and ``max_open``
+    count the subtasks of all.
+
     Args:
         subtasks: The subtasks, in any order.
         start: Where the person is at the beginning.
@@ -111,13 +58,20 @@ class TaskGraph:
         max_open: How many groups may be in progress at once (``pots=1`` is ``max_open=1``); None means no limit.
 
     Raises:
-        TaskError: Duplicate or unknown names, a cycle (named), overlapping groups, no valid sequence at all, or more
-            than 128 subtasks, 131,072 ways to have done some of them, or a million steps between task states.
+        TaskError: Duplicate or unknown names, a cycle (named), overlapping groups, no valid sequence at all, no
+            subtask that the person can perform, or more than 128 subtasks, 131,072 ways to have done some of them, or
+            a million steps between task states.
 
     Example:
         >>> task = TaskGraph([Subtask("first", ("red",)), Subtask("second", ("blue",), after=("first",))], start="home")
         >>> task.num_sequences, [(s.start, s.goals, s.weight) for s in task.stages()]
         (1, [('home', ('red',), 1.0), ('red', ('blue',), 1.0)])
+
+        The robot alone handles the red one; the person, still at home, waits for that.
+
+        >>> task = TaskGraph([Subtask("first", ("red",), agents="robot"), *task.subtasks[1:]], start="home")
+        >>> [(s.start, s.goals, s.weight) for s in task.stages()]
+        [('home', ('blue',), 1.0)]
     """
 
     subtasks: tuple[Subtask, ...]
@@ -142,7 +96,7 @@ class TaskGraph:
                 raise TaskError(f"entry {number} of `subtasks` must be a Subtask, got {shown(subtask)}")
         if groups is not None and not isinstance(groups, Mapping):
             raise TaskError(f"`groups` must map group names to lists of subtasks, got {shown(groups)}")
-        grouped = {name: _names(f"group {name!r} of `groups`", members) for name, members in (groups or {}).items()}
+        grouped = {name: names_in(f"group {name!r} of `groups`", members) for name, members in (groups or {}).items()}
         object.__setattr__(self, "subtasks", tuple(listed))
         object.__setattr__(self, "start", start)
         object.__setattr__(self, "groups", grouped)
@@ -180,6 +134,11 @@ class TaskGraph:
                 if member in seen:
                     raise TaskError(f"subtask {member!r} is in group {seen[member]!r} and in group {group!r}")
                 seen[member] = group
+        if not self.subtasks_of(HUMAN):
+            raise TaskError(
+                "the person can perform no subtask of the task, so that there is nothing to predict: every one has "
+                f"`agents` {list(self.subtasks[0].agents)}; expected {HUMAN!r} among those of at least one"
+            )
         if self.max_open is not None:
             max_open = integer("max_open", self.max_open, 1, also="None", error=TaskError)
             object.__setattr__(self, "max_open", max_open)
@@ -211,7 +170,8 @@ class TaskGraph:
         group_of = {member: i for i, members in enumerate(self.groups.values()) for member in members}
         alike: dict[object, list[Subtask]] = defaultdict(list)
         for s in self.subtasks:
-            alike[s.goals, s.then, frozenset(s.after), frozenset(followers[s.name]), group_of.get(s.name)].append(s)
+            waiting = frozenset(s.after), frozenset(followers[s.name])
+            alike[s.goals, s.then, waiting, group_of.get(s.name), s.agents].append(s)
         index = {s.name: i for i, members in enumerate(alike.values()) for s in members}
         return [
             SubtaskClass(
@@ -220,6 +180,7 @@ class TaskGraph:
                 count=sum(s.count for s in members),
                 predecessors=tuple(sorted({index[name] for name in first.after})),
                 group=group_of.get(first.name),
+                agents=first.agents,
             )
             for members in alike.values()
             for first in members[:1]
@@ -244,8 +205,13 @@ class TaskGraph:
 
     @property
     def length(self) -> int:
-        """Number of subtasks in every valid sequence, copies counted."""
+        """Number of subtasks in every valid sequence, copies counted, whoever performs them."""
         return sum(s.count for s in self.subtasks)
+
+    @property
+    def num_choices(self) -> int:
+        """Number of the person's steps in every valid sequence: how often they choose what to do next."""
+        return sum(s.count for s in self.subtasks_of(HUMAN))
 
     @property
     def goals(self) -> tuple[str, ...]:
@@ -258,8 +224,29 @@ class TaskGraph:
         passed = {place for s in self.subtasks for place in s.then}
         return tuple(sorted(passed | {self.start} | set(self.goals)))
 
+    def subtasks_of(self, agent: str) -> tuple[Subtask, ...]:
+        """Subtasks that an agent, ``"human"`` or ``"robot"``, can perform."""
+        choice("agent", agent, AGENTS, error=TaskError)
+        return tuple(s for s in self.subtasks if agent in s.agents)
+
+    def reserved_for(self, agent: str) -> tuple[Subtask, ...]:
+        """Subtasks that nobody but an agent, ``"human"`` or ``"robot"``, can perform."""
+        return tuple(s for s in self.subtasks_of(agent) if len(s.agents) == 1)
+
+    def goals_of(self, agent: str) -> tuple[str, ...]:
+        """Goals of the subtasks that an agent can perform, sorted by name."""
+        return tuple(sorted({goal for s in self.subtasks_of(agent) for goal in s.goals}))
+
+    def places_of(self, agent: str) -> tuple[str, ...]:
+        """Places that an agent may have to get to: of the subtasks it can perform, and the start if it is the person's.
+
+        Sorted by name.
+        """
+        passed = {place for s in self.subtasks_of(agent) for place in s.then}
+        return tuple(sorted(passed | set(self.goals_of(agent)) | ({self.start} if agent == HUMAN else set())))
+
     def stages(self) -> tuple[Stage, ...]:
-        """All distinct stages with their exact expected visits; weights sum to :attr:`length`."""
+        """All distinct stages with their exact expected visits; weights sum to :attr:`num_choices`."""
         weights: dict[tuple[str, tuple[str, ...]], list[float]] = defaultdict(list)
         for t in self._transitions:
             weights[t.start, t.goals].append(t.weight)
@@ -274,11 +261,11 @@ class TaskGraph:
         return tuple(Transition(*key, weight) for key, weight in sorted(self._space.transition_weights().items()))
 
     def sample(self, rng: np.random.Generator) -> tuple[Transition, ...]:
-        """One uniformly random valid sequence, as the transitions it makes; each weighs 1."""
+        """One uniformly random valid sequence, as the person's transitions in it; each weighs 1."""
         return tuple(Transition(*step, 1.0) for step in self._space.sample(rng))
 
     def legs(self) -> dict[tuple[str, str], float]:
-        """Expected number of legs from each place to each other place in a uniformly random valid sequence."""
+        """Expected number of the person's legs from each place to each other place in a random valid sequence."""
         legs: dict[tuple[str, str], float] = defaultdict(float)
         for t in self._transitions:
             stops = (t.start, t.goal, *t.then)
@@ -299,6 +286,8 @@ class TaskGraph:
                 entry["then"] = list(s.then)
             if s.count != 1:
                 entry["count"] = s.count
+            if s.agents != AGENTS:
+                entry["agents"] = list(s.agents)
             subtasks.append(entry)
         data: dict[str, Any] = {"start": self.start, "subtasks": subtasks}
         if self.groups:
@@ -324,7 +313,14 @@ class TaskGraph:
         try:
             content = validated(TaskContent, as_plain(data), "the task")
             subtasks = [
-                Subtask(entry.name, tuple(entry.goals), tuple(entry.after), tuple(entry.then), entry.count)
+                Subtask(
+                    entry.name,
+                    tuple(entry.goals),
+                    tuple(entry.after),
+                    tuple(entry.then),
+                    entry.count,
+                    tuple(entry.agents),
+                )
                 for entry in content.subtasks
             ]
             return cls(subtasks, content.start, content.groups, content.max_open)
@@ -362,15 +358,7 @@ class TaskGraph:
         graph: nx.DiGraph = nx.DiGraph(start=self.start, max_open=self.max_open)
         group_of = {member: group for group, members in self.groups.items() for member in members}
         for s in self.subtasks:
-            graph.add_node(s.name, goals=s.goals, then=s.then, count=s.count, group=group_of.get(s.name))
+            group = group_of.get(s.name)
+            graph.add_node(s.name, goals=s.goals, then=s.then, count=s.count, agents=s.agents, group=group)
         graph.add_edges_from((before, s.name) for s in self.subtasks for before in s.after)
         return graph
-
-
-def _names(what: str, value: object) -> tuple[str, ...]:
-    """Names in a list, or a single one."""
-    names = [value] if isinstance(value, str) else entries(value)
-    empty_is_meant = isinstance(value, Iterable) and not isinstance(value, str | bytes | Mapping)
-    if not all(isinstance(name, str) and name and is_whole(name) for name in names) or not (names or empty_is_meant):
-        raise TaskError(f"{what} must hold non-empty names, got {shown(value)}")
-    return tuple(names)

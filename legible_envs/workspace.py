@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from legible_envs.key_space import KeySpace
+from legible_envs.layout_kinds import kind_named, list_layout_kinds
 from legible_envs.random_keys import BoundedKeys, KeyDecoder
 from legible_envs.support.arrays import number_rows
 from legible_envs.support.plugins import Plugin, Registry
@@ -229,6 +230,17 @@ class Workspace(ABC):
     @abstractmethod
     def explain(self, genome: npt.ArrayLike) -> list[dict[str, Any]]:
         """Where one layout wins and loses its score: a row per stage and goal; plain data."""
+
+    def text(self, genome: npt.ArrayLike) -> str:
+        """One layout as text: as its kind writes it (:mod:`legible_envs.layout_kinds`), or else as it prints itself."""
+        layout = self.decode(genome)
+        return kind_named(self.name).to_text(layout) if self.name in list_layout_kinds() else str(layout)
+
+    def draw(self, genome: npt.ArrayLike) -> npt.NDArray[np.uint8]:
+        """``(height, width, 3)`` picture of one layout: its text, unless a workspace overrides this."""
+        from legible_envs.drawing.sheets import draw_text
+
+        return draw_text(self.text(genome))
 
     def simulate(
         self, genome: npt.ArrayLike, participants: int, rng: np.random.Generator, **settings: Any

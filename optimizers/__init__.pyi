@@ -8,6 +8,7 @@ from .emitters.gradient_arborescence import GradientArborescenceEmitter
 from .emitters.improve import ImproveWorkspaceEmitter
 from .emitters.mutation import MutationEmitter
 from .emitters.novelty import NoveltyLocalCompetitionEmitter
+from .emitters.policy_gradient import PolicyGradientEmitter
 from .emitters.random import RandomWorkspaceEmitter
 from .emitters.registry import list_emitters, make_emitter, register_emitter
 from .errors import CheckpointError, ClusterError, EmitterError, SearchError, SearchInterrupted
@@ -30,6 +31,7 @@ __all__ = [
     "ImproveWorkspaceEmitter",
     "MutationEmitter",
     "NoveltyLocalCompetitionEmitter",
+    "PolicyGradientEmitter",
     "RandomWorkspaceEmitter",
     "SearchError",
     "SearchInterrupted",

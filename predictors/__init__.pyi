@@ -2,6 +2,7 @@ from .base import CandidatePredictor, GoalPredictor
 from .evaluation.decisions import ThresholdDecision
 from .grid.baselines import GridLogistic, GridNeighbours, GridNGram
 from .grid.bayesian import BayesianGoalPredictor
+from .grid.behaviour_cloning import BehaviourCloning
 from .grid.maxent_irl import MaxEntIRL
 from .grid.shortest_distance import ShortestDistance
 from .inputs import TrajectoryError
@@ -14,6 +15,7 @@ from .uniform import UniformPredictor
 
 __all__ = [
     "BayesianGoalPredictor",
+    "BehaviourCloning",
     "CandidatePredictor",
     "GoalPredictor",
     "GridLogistic",

@@ -45,6 +45,7 @@ class PredictorError(ContractError):
 
 BUILT_IN: Final = {
     "bayesian": "predictors.grid.bayesian:BayesianGoalPredictor",
+    "behaviour-cloning": "predictors.grid.behaviour_cloning:BehaviourCloning",
     "grid-knn": "predictors.grid.baselines:GridNeighbours",
     "grid-logistic": "predictors.grid.baselines:GridLogistic",
     "grid-ngram": "predictors.grid.baselines:GridNGram",

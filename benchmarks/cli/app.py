@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from benchmarks.cli.datasets import datasets
 from benchmarks.cli.destinations import DestinationFile, DestinationFolder, check_folder
 from benchmarks.cli.humans import evaluate
 from benchmarks.cli.options import (
@@ -35,7 +36,7 @@ __all__ = ["main"]
 CONTENTS = {
     "Search": ("optimize", "report"),
     "Layouts": ("score", "show", "play"),
-    "Participants and predictors": ("humans fetch", "humans stats", "humans evaluate"),
+    "Participants and predictors": ("humans fetch", "humans stats", "humans evaluate", "datasets make"),
     "Experiments": ("sweep", "reproduce", "bench"),
     "Studies with people": (
         "study new", "study check", "study simulate", "study serve", "study recruit", "study progress", "study code",
@@ -77,6 +78,7 @@ def main(traceback: bool) -> None:
     """
 
 
+main.add_command(datasets)
 main.add_command(sweep)
 main.add_command(reproduce)
 main.add_command(study)

@@ -105,6 +105,7 @@ class Kitchen(Design):
         """Score, distance, task, and the rule it breaks."""
         summary = self.summary()
         part, share = summary["single_goal_score"], summary["single_goal_share"]
+        robots = self._scorer.task.reserved_for("robot")
         return [
             ("legibility", number(summary["score"], 4)),
             ("distance", number(summary["distance"], 4)),
@@ -112,6 +113,7 @@ class Kitchen(Design):
             ("single-goal", number(part, 4) + (f" ({share:.1%} of the score)" if 0 <= share <= 1 else "")),
             ("obstacles", str(summary["num_obstacles"])),
             ("task", "; ".join(" + ".join(soup) for soup in self.soups)),
+            *([("robot alone", ", ".join(s.name for s in robots))] if robots else []),
             ("candidate set", summary["candidate_set"]),
             ("sequences", f"{summary['num_sequences']:,}"),
             ("layout id", summary["layout_id"]),

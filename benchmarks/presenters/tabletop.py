@@ -99,6 +99,7 @@ class TableDesign(Design):
         summary = self.summary()
         part, whole = summary["single_goal_score"], summary["score"]
         share = part / whole if whole else math.nan
+        robots = self.task.graph.reserved_for("robot")
         return [
             ("legibility", number(whole, 4)),
             ("distance", f"{number(summary['distance'], 4)} m"),
@@ -108,6 +109,7 @@ class TableDesign(Design):
             ("single-goal", number(part, 4) + (f" ({share:.1%} of the score)" if 0 <= share <= 1 else "")),
             ("obstacles", str(summary["num_obstacles"])),
             ("task", self.task.name),
+            *([("robot alone", ", ".join(s.name for s in robots))] if robots else []),
             ("candidate set", summary["candidate_set"]),
             ("sequences", f"{summary['num_sequences']:,}"),
             ("layout id", summary["layout_id"]),

@@ -21,6 +21,7 @@ from benchmarks.throughput.predictors_reaching import reach_speed
 from benchmarks.throughput.study import study_speed
 from benchmarks.throughput.sweep import FULL, OPTIMUM_5X5, QUICK, Settings
 from benchmarks.throughput.tabletop import table_drawing, table_games, table_people, table_scoring, table_searching
+from benchmarks.throughput.teams import team_games
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -67,6 +68,7 @@ def run_benchmark(
             ("scoring layouts", lambda: scoring(settings)),
             ("searching", lambda: searching(settings)),
             ("playing", lambda: games(settings, game)),
+            ("playing as teams", lambda: team_games(settings)),
             ("scoring tables", lambda: table_scoring(settings)),
             ("searching tables", lambda: table_searching(settings)),
             ("playing at tables", lambda: table_games(settings)),

@@ -1,12 +1,13 @@
 """The moving pictures of README and site, made by the program itself.
 
-    python docs/_ext/animations.py    # writes these three, about ten seconds
+    python docs/_ext/animations.py    # writes these four, about ten seconds
 
 - ``docs/images/prediction.gif``: one person fetches the same ingredients in two kitchens, and an observer's belief;
 - ``docs/images/kitchen.gif``: ``LegibleOvercooked-v0`` with the scripted player;
-- ``docs/images/table.gif``: ``LegibleTabletop-v0`` with a simulated participant.
+- ``docs/images/table.gif``: ``LegibleTabletop-v0`` with a simulated participant;
+- ``docs/images/design.gif``: ``LegibleDesign-v0`` with a designer who always makes the best edit.
 
-All are seeded: a second run writes the same bytes. The pages of the environments show the last two as well.
+All are seeded: a second run writes the same bytes. The pages of the environments show the last three as well.
 """
 
 from __future__ import annotations
@@ -54,6 +55,7 @@ class Episode(NamedTuple):
 
 
 EPISODES = {
+    "LegibleDesign-v0": Episode("design.gif", steps=24, every=1, milliseconds=700),
     "LegibleOvercooked-v0": Episode("kitchen.gif", steps=60, every=1, milliseconds=150),  # until the first soup is out
     "LegibleTabletop-v0": Episode("table.gif", steps=500, every=6, milliseconds=110),  # the whole task, a little faster
 }
@@ -161,12 +163,31 @@ def _side_by_side(frames: Sequence[Frame], goal: str) -> Frame:
     return sheet
 
 
+class GreedyDesigner:
+    """Makes the edit that gains most; keeps the layout where none gains."""
+
+    def __init__(self, env: gym.Env) -> None:
+        self.game = env.unwrapped
+
+    def __call__(self, obs: Frame, info: dict) -> int:
+        valid = np.flatnonzero(info["action_mask"])
+        genomes = self.game.edits.apply(np.repeat(info["genome"][None], len(valid), axis=0), valid)
+        return int(valid[np.argmax(self.game.problem.scores(genomes))])
+
+
+PLAYERS = {
+    "LegibleDesign-v0": lambda env, rng: GreedyDesigner(env),
+    "LegibleOvercooked-v0": ScriptedPlayer,
+    "LegibleTabletop-v0": lambda env, rng: ReachingPlayer(env, sample_person(rng), rng),
+}
+
+
 def episode_frames(env_id: str) -> Iterator[tuple[Frame, int]]:
-    """An environment with a simulated person at work; the last frame rests."""
+    """An environment at work, with a simulated person or a designer; the last frame rests."""
     rng = np.random.default_rng(0)
     env = gym.make(env_id, render_mode="rgb_array")
     obs, info = env.reset(seed=4)
-    player = ScriptedPlayer(env, rng) if "Overcooked" in env_id else ReachingPlayer(env, sample_person(rng), rng)
+    player = PLAYERS[env_id](env, rng)
     episode = EPISODES[env_id]
     for step in range(episode.steps):
         if step % episode.every == 0:

@@ -13,7 +13,11 @@ from sphinx.application import Sphinx
 
 import legible_envs  # noqa: F401 - registers the environments
 
-IDS = ("LegibleOvercooked-v0", "LegibleTabletop-v0")
+SHOWN = {
+    "LegibleOvercooked-v0": "with a simulated person at work",
+    "LegibleTabletop-v0": "with a simulated person at work",
+    "LegibleDesign-v0": "with a designer who always makes the best edit",
+}
 SECTION = re.compile(r"^(Args|Raises|Returns|Attributes|Example):$", re.MULTILINE)
 ENTRY = re.compile(r"^ {4}(\w+): ", re.MULTILINE)
 
@@ -37,7 +41,7 @@ def page(env_id: str, picture: str) -> str:
     ]
     env.close()
     table = "| | |\n| --- | --- |\n" + "\n".join(f"| {key} | {value} |" for key, value in facts)
-    image = f"![{env_id} with a simulated person at work]({picture})"
+    image = f"![{env_id} {SHOWN[env_id]}]({picture})"
     return f"# {env_id}\n\n{summary}\n\n{image}\n\n{table}\n\n{as_markdown(body)}\n"
 
 
@@ -74,7 +78,7 @@ def write_pages(app: Sphinx) -> None:
     """Write every page that has changed, and its picture."""
     folder = Path(app.srcdir) / "environments"
     folder.mkdir(exist_ok=True)
-    for env_id in IDS:
+    for env_id in SHOWN:
         picture = f"{env_id}.gif"
         if not (folder / picture).exists():
             write_episode(env_id, folder / picture)

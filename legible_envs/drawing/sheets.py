@@ -14,7 +14,7 @@ from legible_envs.drawing.palette import PAGE
 from legible_envs.support.files import write_atomically
 from legible_envs.support.validation import integer
 
-__all__ = ["banner", "check_tile", "draw_side_by_side", "fit_text", "overlay", "save_png"]
+__all__ = ["banner", "check_tile", "draw_side_by_side", "draw_text", "fit_text", "overlay", "save_png"]
 
 
 def check_tile(tile: int) -> int:
@@ -34,6 +34,31 @@ def fit_text(text: str, size: int, colour: str, width: int) -> Sprite:
         if sprite.colour.shape[1] <= width:
             return sprite
     return text_sprite("…", smallest, colour)
+
+
+def draw_text(text: str, *, size: int = 28, rows: int = 40, columns: int = 100) -> Image:
+    """A text as a picture, every character in a cell of its own, so that drawings in characters keep their shape.
+
+    Args:
+        text: Any number of lines.
+        size: Pixels of a line.
+        rows: Lines that are drawn at most.
+        columns: Characters of a line that are drawn at most.
+
+    Returns:
+        ``(height, width, 3)`` uint8; a new array each time.
+    """
+    lines = [line[:columns] for line in text.split("\n")[:rows]]
+    wide = max(8, size * 2 // 3)
+    image = np.empty((size * (len(lines) + 1), wide * (max(map(len, lines)) + 2), 3), np.uint8)
+    image[:] = rgb(PAGE["page"])
+    for row, line in enumerate(lines):
+        for column, character in enumerate(line):
+            if not character.isspace():
+                sprite = fit_text(character, size, PAGE["ink"], wide)
+                middle = (wide - sprite.colour.shape[1]) // 2
+                paste(image, sprite, size // 2 + row * size, wide * (column + 1) + middle)
+    return image
 
 
 def banner(image: Image, title: str, tile: int) -> Image:

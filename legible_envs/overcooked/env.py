@@ -15,7 +15,7 @@ from gymnasium.error import ResetNeeded
 from legible_envs.drawing.rendered import Rendered
 from legible_envs.errors import LayoutError
 from legible_envs.overcooked.game import batch
-from legible_envs.overcooked.game.observations import grid_observation, vector_observation
+from legible_envs.overcooked.game.observations import grid_observations, vector_observations
 from legible_envs.overcooked.game.snapshot import make_view, name_goals, to_text
 from legible_envs.overcooked.game.vectors import CROSSINGS, DELIVERIES, STATE_SIZE, Kitchen, Vector
 from legible_envs.overcooked.game.view import GameView
@@ -266,7 +266,7 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
         self._goals = np.zeros((players, self.settings.shape[0] * self.settings.shape[1]), dtype=np.bool_)
         self._log = bytearray()
         self._begun = False
-        self._own_shape = self.settings.player_observation_space().shape
+        self._all_shape = (players, *(self.settings.player_observation_space().shape or ()))
         self._install(self.settings.pack(self.settings.preview()))
 
     # -- the Gymnasium interface --------------------------------------------------------------------------------------
@@ -324,17 +324,19 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
         """
         if not self._begun:
             raise ResetNeeded("Cannot call env.step() before calling env.reset()")
-        if self._agents == 1:
-            move = action if type(action) is int and 0 <= action < NUM_ACTIONS else read_action(action)
-            self._actions[0] = move
-            self._log.append(move)
-            if self._team is not None:
-                self._actions[1] = self._team.action
-                self._log.append(self._team.action)
-        else:
-            moves = read_actions(action, self._players)
-            self._actions[:] = moves
-            self._log.extend(moves)
+        moves = [read_action(action)] if self._agents == 1 else read_actions(action, self._players)
+        if self._team is not None:
+            moves.append(self._team.action)
+        return self.play(moves)
+
+    def play(self, moves: list[int]) -> tuple[npt.NDArray[Any], float, bool, bool, dict[str, Any]]:
+        """As :meth:`step` after the first reset, without looking at the actions again.
+
+        Args:
+            moves: An integer 0..5 for each player.
+        """
+        self._actions[:] = moves
+        self._log.extend(moves)
         masks = np.empty((self._players, NUM_ACTIONS), dtype=np.int8)
         reward, over, _ = batch.play(
             self._state, self._kitchen, self._rules, self.settings.weights, self._actions, self._goals, masks
@@ -398,21 +400,21 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
 
     def observe(self) -> npt.NDArray[Any]:
         """The observation of this moment, made anew."""
-        if self._agents == 1:
-            return self._observe_as(0)
-        return np.stack([self._observe_as(player) for player in range(self._players)])
+        observations = self._observe_all()
+        return observations[0] if self._agents == 1 else observations
 
-    def _observe_as(self, player: int) -> npt.NDArray[Any]:
+    def _observe_all(self) -> npt.NDArray[Any]:
+        """What each player sees, one behind the other."""
         obs_type = self.settings.obs_type
         if obs_type == "grid":
-            grid = np.zeros(self._own_shape, dtype=np.uint8)
-            grid_observation(self._state, self._kitchen, self._rules, player, grid)
-            return grid
+            grids = np.zeros(self._all_shape, dtype=np.uint8)
+            grid_observations(self._state, self._kitchen, self._rules, grids)
+            return grids
         if obs_type == "vector":
-            features = np.zeros(self._own_shape, dtype=np.float32)
-            vector_observation(self._state, self._kitchen, self._rules, self._packed.routes, player, features)
+            features = np.zeros(self._all_shape, dtype=np.float32)
+            vector_observations(self._state, self._kitchen, self._rules, self._packed.routes, features)
             return features
-        return draw_small(self.view())
+        return np.repeat(draw_small(self.view())[None], self._players, axis=0)
 
     def _info(self, masks: npt.NDArray[np.int8]) -> dict[str, Any]:
         goals = self._goals.reshape(self._players, *self.settings.shape).copy()
@@ -439,7 +441,7 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
     def _look_as_partner(self) -> tuple[npt.NDArray[Any], dict[str, Any]]:
         """The partner's own observation and info."""
         goals = self._goals[PARTNER].reshape(self.settings.shape).copy()
-        return self._observe_as(PARTNER), {
+        return self._observe_all()[PARTNER].copy(), {
             "goal_mask": goals,
             "action_mask": self._masks[PARTNER].copy(),
             **self._counts(),

@@ -69,8 +69,8 @@ class OvercookedParallelEnv(TeamParallelEnv):
         return self._deal(*self.kitchen.reset(seed=seed, options=options))
 
     def _advance(self, actions: Mapping[str, Any]) -> tuple[dict[str, Any], float, bool, dict[str, dict[str, Any]]]:
-        joint: Any = [read_action(actions[agent]) for agent in self.possible_agents]
-        observation, reward, is_over, _, info = self.kitchen.step(joint if len(joint) > 1 else joint[0])
+        moves = [read_action(actions[agent]) for agent in self.possible_agents]
+        observation, reward, is_over, _, info = self.kitchen.play(moves)
         observations, infos = self._deal(observation, info)
         return observations, reward, is_over, infos
 
@@ -81,8 +81,6 @@ class OvercookedParallelEnv(TeamParallelEnv):
         agents = self.possible_agents
         if len(agents) == 1:
             return {agents[0]: observation}, {agents[0]: info}
-        infos = [
-            {**info, "goal_mask": goals, "action_mask": mask}
-            for goals, mask in zip(info["goal_mask"], info["action_mask"], strict=True)
-        ]
-        return dict(zip(agents, observation, strict=True)), dict(zip(agents, infos, strict=True))
+        goals, masks = info["goal_mask"], info["action_mask"]
+        infos = {agent: {**info, "goal_mask": goals[i], "action_mask": masks[i]} for i, agent in enumerate(agents)}
+        return dict(zip(agents, observation, strict=True)), infos

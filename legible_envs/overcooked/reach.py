@@ -18,6 +18,7 @@ import numpy.typing as npt
 from legible_envs.errors import LayoutError, TaskError
 from legible_envs.overcooked.grid import Cell
 from legible_envs.overcooked.layout import COUNTER, OvercookedLayout
+from legible_envs.subtasks import HUMAN
 from legible_envs.support.validation import integer, shown
 from legible_envs.tasks import TaskGraph
 
@@ -75,7 +76,9 @@ class Reach:
         return tuple(cell for cell in self.layout.access(name) if self.floor[cell])
 
     def check_task(self, task: TaskGraph) -> None:
-        """Check that the person can do a task: some station of every type it needs is in reach.
+        """Check that the person can do their part of a task: some station of every type they need is in reach.
+
+        Stations that only a robot goes to must be in the kitchen, but not in the person's reach.
 
         Raises:
             LayoutError: The kitchen lacks a station, or none of its type is in reach; the message names types and
@@ -92,7 +95,7 @@ class Reach:
             raise LayoutError(
                 f"the task needs {needed}: there is {lacking} in this kitchen, which has {there}", rule="station"
             )
-        shut = {kind: _meant(self.layout, kind) for kind in task.places if not self.named(kind)}
+        shut = {kind: _meant(self.layout, kind) for kind in task.places_of(HUMAN) if not self.named(kind)}
         if shut:
             first = next(iter(shut.values()))
             is_or_are = "is" if len(shut) == len(first) == 1 else "are"
@@ -113,7 +116,7 @@ class Reach:
         if self.player is None:
             return ""
         others = (reach_of(self.layout, number) for number in range(1, len(self.layout.starts) + 1))
-        able = [f"player {one.player}" for one in others if all(one.named(place) for place in task.places)]
+        able = [f"player {one.player}" for one in others if all(one.named(place) for place in task.places_of(HUMAN))]
         return f"; {_listed(able)} can do it" if able else ""
 
 

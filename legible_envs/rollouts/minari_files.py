@@ -13,11 +13,12 @@ import json
 import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 import numpy as np
 
+from legible_envs.rollouts.minari_writing import LABELS, episode_buffer, import_minari
 from legible_envs.rollouts.replaying import RecordedEpisode, Replayer, environment_of
 from legible_envs.rollouts.trajectory import Trajectory
 from legible_envs.support.plain_data import parse_json
@@ -28,9 +29,6 @@ if TYPE_CHECKING:
     from legible_envs.rollouts.recording import RecordTrajectories
 
 __all__ = ["find_dataset", "from_minari", "is_minari_folder", "to_minari"]
-
-_LABELS: Final = "legible_envs"
-"""Key of what an episode's metadata keep beside Minari's own: JSON with the arguments of ``trajectories``."""
 
 
 def to_minari(recorded: RecordTrajectories, dataset_id: str, **metadata: Any) -> Any:
@@ -52,37 +50,18 @@ def to_minari(recorded: RecordTrajectories, dataset_id: str, **metadata: Any) ->
         ImportError: Minari is not installed.
         ValueError: Nothing was recorded, or there is a data set of that name.
     """
-    minari = _import_minari()
-    from minari.data_collector import EpisodeBuffer
-
+    minari = import_minari()
     episodes = recorded.episodes
     if not episodes:
         raise ValueError("nothing was recorded; play at least one step first")
     if dataset_id in minari.list_local_datasets():
         raise ValueError(f"there is a Minari data set {dataset_id!r} already; delete it or choose another name")
-    buffers = []
-    for number, episode in enumerate(episodes):
-        over = episode.terminations[-1] or episode.truncations[-1]
-        buffers.append(
-            EpisodeBuffer(
-                id=number,
-                seed=episode.seed,
-                options={
-                    key: json.dumps(value) if isinstance(value, Mapping) else value
-                    for key, value in episode.options.items()
-                },
-                observations=np.stack(episode.observations),
-                actions=np.stack(episode.actions),
-                rewards=list(episode.rewards),
-                terminations=list(episode.terminations),
-                truncations=[*episode.truncations[:-1], episode.truncations[-1] or not over],
-            )
-        )
+    buffers = [episode_buffer(number, episode) for number, episode in enumerate(episodes)]
     spec = recorded.env.spec
     name = type(recorded.env.unwrapped).__name__ if spec is None else spec.id
     about = {"algorithm_name": "recorded rollouts", "description": f"Episodes of {name}."} | metadata
     dataset = minari.create_dataset_from_buffers(dataset_id, buffers, env=recorded.env, **about)
-    dataset.storage.update_episode_metadata([{_LABELS: json.dumps(recorded.labels(episode))} for episode in episodes])
+    dataset.storage.update_episode_metadata([{LABELS: json.dumps(recorded.labels(episode))} for episode in episodes])
     return dataset
 
 
@@ -126,7 +105,7 @@ def from_minari(
         replayer = Replayer(game, [episode.options.get("layout") for episode in episodes], _is_lossy(found))
         trajectories = []
         for episode in episodes:
-            trajectories += replayer.trajectories(episode, **{**episode.labels, **given})
+            trajectories += replayer.trajectories(episode, **given)
         return trajectories
     finally:
         if env is None:
@@ -141,20 +120,11 @@ def is_minari_folder(path: Path) -> bool:
 def find_dataset(name: str) -> Any | None:
     """The local data set of that id; None where there is none, or no Minari."""
     try:
-        minari = _import_minari()
+        minari = import_minari()
         path = Path(minari.storage.get_dataset_path(name))
     except (ImportError, ValueError):
         return None
     return path if is_minari_folder(path) else None
-
-
-def _import_minari() -> Any:
-    try:
-        import minari
-        import minari.storage
-    except ImportError as error:
-        raise ImportError("Minari is not installed; install the extra: pip install 'legible-envs[minari]'") from error
-    return minari
 
 
 def _data_folder(path: Path) -> Path | None:
@@ -162,7 +132,7 @@ def _data_folder(path: Path) -> Path | None:
 
 
 def _opened(dataset: Any) -> Any:
-    minari = _import_minari()
+    minari = import_minari()
     if isinstance(dataset, minari.MinariDataset):
         return dataset
     path = Path(dataset)
@@ -194,7 +164,7 @@ def _episodes(dataset: Any) -> Iterator[RecordedEpisode]:
     indices = [int(index) for index in dataset.episode_indices]
     about = list(dataset.storage.get_episode_metadata(indices))
     for metadata, episode in zip(about, dataset.iterate_episodes(indices), strict=True):
-        labels = metadata.get(_LABELS)
+        labels = metadata.get(LABELS)
         yield RecordedEpisode(
             name=f"episode {episode.id} of the data set {dataset.id!r}",
             seed=metadata.get("seed"),
@@ -202,19 +172,20 @@ def _episodes(dataset: Any) -> Iterator[RecordedEpisode]:
             observations=np.asarray(episode.observations),
             actions=np.asarray(episode.actions),
             rewards=np.asarray(episode.rewards, dtype=np.float64),
-            labels={} if labels is None else _labels(labels, episode.id),
+            labels=[{}] if labels is None else _labels(labels, episode.id),
         )
 
 
-def _labels(text: object, episode: object) -> dict[str, Any]:
-    """The arguments of ``trajectories`` that :func:`to_minari` kept."""
+def _labels(text: object, episode: object) -> list[dict[str, Any]]:
+    """The arguments of ``trajectories`` that were kept: those of one player, or a list with those of each."""
     try:
         labels = parse_json(text) if isinstance(text, str) else text
     except ValueError as error:
         raise ValueError(f"episode {episode}: its labels cannot be read: {error}") from error
-    if not isinstance(labels, dict):
-        raise ValueError(f"episode {episode}: its labels must be a mapping, got {shown(labels)}")
-    return labels
+    listed: list[Any] = labels if isinstance(labels, list) else [labels]
+    if not listed or not all(isinstance(entry, dict) for entry in listed):
+        raise ValueError(f"episode {episode}: its labels must be a mapping or a list of such, got {shown(labels)}")
+    return listed
 
 
 def _plain(options: Mapping[str, Any]) -> dict[str, Any]:

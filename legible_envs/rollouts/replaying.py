@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Final
 
 import gymnasium as gym
@@ -22,6 +22,8 @@ _TOLERANCE: Final = 1e-5
 _JPEG_LEVELS: Final = 16.0
 """Mean difference of two pictures' levels of 255 up to which they are the same but for their compression."""
 _GOAL, _IN_HAND = ": goal", ": in hand"
+_WORDS: Final = ("random:train", "random:test")
+"""Values of arguments that look like names of code, and are none: distributions of kitchens."""
 _CAUSES: Final = (
     "It was recorded with another version of the environment, through wrappers that change what the environment sees "
     "or shows and are not in the data set's description (pass `env=`), or something set in the environment between its "
@@ -40,7 +42,7 @@ class RecordedEpisode:
         observations: ``(T + 1, …)``.
         actions: ``(T, …)``.
         rewards: ``(T,)``.
-        labels: Arguments of the environment's ``trajectories``.
+        labels: Arguments of the environment's ``trajectories``, once for each player whose trajectories are wanted.
     """
 
     name: str
@@ -49,7 +51,7 @@ class RecordedEpisode:
     observations: npt.NDArray[Any]
     actions: npt.NDArray[Any]
     rewards: npt.NDArray[np.float64]
-    labels: Mapping[str, Any] = field(default_factory=dict)
+    labels: Sequence[Mapping[str, Any]] = ({},)
 
 
 def environment_of(spec: EnvSpec | None, dataset: str) -> gym.Env[Any, Any]:
@@ -71,7 +73,7 @@ def environment_of(spec: EnvSpec | None, dataset: str) -> gym.Env[Any, Any]:
             "are passed as `env=`"
         )
     code = [f"wrapper {wrapper.entry_point}" for wrapper in spec.additional_wrappers or () if _is_foreign(wrapper)]
-    code += [f"{name}={value!r}" for name, value in spec.kwargs.items() if _names_code(value)]
+    code += [f"{name}={value!r}" for name, value in spec.kwargs.items() if value not in _WORDS and _names_code(value)]
     if code:
         raise ValueError(
             f"the data set {dataset!r} asks for code by its name: {', '.join(code)}; pass `env=` to use it"
@@ -126,7 +128,7 @@ class Replayer:
 
         Args:
             episode: The episode.
-            **labels: Arguments of the environment's ``trajectories``.
+            **labels: Arguments of the environment's ``trajectories``, instead of the episode's own.
 
         Raises:
             ValueError: It does not play again as it was recorded.
@@ -152,10 +154,10 @@ class Replayer:
                     f"{float(reward):g} now. {_CAUSES}"
                 )
         try:
-            found: list[Trajectory] = self._game.trajectories(**labels)
-        except TypeError as error:  # labels of a file may be those of another environment
+            found = [self._game.trajectories(**{**own, **labels}) for own in episode.labels]
+        except (TypeError, IndexError) as error:  # labels of a file may be those of another environment
             raise ValueError(f"{episode.name} has labels that do not fit: {error}") from error
-        return found
+        return [trajectory for part in found for trajectory in part]
 
     def _begin(self, episode: RecordedEpisode) -> None:
         """Reset, on the layout whose first observation is the recorded one."""

@@ -13,8 +13,9 @@ from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 
 from legible_envs.drawing.rendered import Rendered
-from legible_envs.errors import LayoutError
+from legible_envs.errors import LayoutError, TaskError
 from legible_envs.rollouts.trajectory import Trajectory
+from legible_envs.subtasks import ROBOT
 from legible_envs.support.per_env import own_entry
 from legible_envs.support.specs import JsonSpec, check_options
 from legible_envs.support.validation import shown
@@ -78,7 +79,10 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
 
     **The robot** (`partner="robot"`) decides 30 times a second. It waits until its predictor is sure of the person's
     goal, then takes another valid object, the nearest to its gripper, and puts it in its place. An object belongs to
-    the first to take it; in the same step, to the person.
+    the first to take it; in the same step, to the person. Where the task says who can perform a subtask
+    (`Subtask(agents=...)`), the hand takes nothing that only the robot may, nor the robot what only the person may. For
+    an object that only the robot may take the robot waits for no prediction, and the person, where nothing else is
+    valid, waits for the robot.
 
     ## Action Space
 
@@ -207,7 +211,7 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
 
     Raises:
         LayoutError: A layout that cannot be read, breaks a rule (`rule` names it), or is of another task.
-        TaskError: Not a task.
+        TaskError: Not a task; or it has subtasks that only a robot can perform, and there is no partner.
         ValueError: Any other bad argument, options of `reset` or actions; at `reset`, a predictor given by name that
             cannot be fitted at this table.
         ResetNeeded: `step` before the first `reset`.
@@ -276,6 +280,11 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
 
     def _make_team(self, partner: object, predictor: object) -> Team:
         if partner is None:
+            if reserved := self.settings.task.graph.reserved_for(ROBOT):
+                raise TaskError(
+                    f"task {self.settings.task.name!r} has subtasks that only a robot can perform, and there is none: "
+                    f"{[subtask.name for subtask in reserved]}; set `partner`, such as partner='robot'"
+                )
             return Team(observer=None if predictor is None else IntentObserver(predictor))
         if not self.settings.task.configuration:
             raise ValueError(

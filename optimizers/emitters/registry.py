@@ -68,6 +68,7 @@ _registry = Registry(
         "improve": "optimizers.emitters.improve:ImproveWorkspaceEmitter",
         "mutation": "optimizers.emitters.mutation:MutationEmitter",
         "nslc": "optimizers.emitters.novelty:NoveltyLocalCompetitionEmitter",
+        "ppo": "optimizers.emitters.policy_gradient:PolicyGradientEmitter",
         "random": "optimizers.emitters.random:RandomWorkspaceEmitter",
     },
     EmitterError,

@@ -193,6 +193,18 @@ def test_score_says_what_the_workspace_says(run: Path) -> None:
     assert float(quarter["legibility"]) == pytest.approx(expected, abs=1e-3)
 
 
+def test_a_score_of_a_team_says_what_the_robot_does_alone(tmp_path: Path) -> None:
+    task = TabletopTask.named("tea")
+    given = {**task.to_dict(), "name": "tea for two"}
+    given["task"]["subtasks"][2]["agents"] = "robot"
+    team, layout = TabletopTask.from_dict(given), task.layout
+    team.to_yaml(tmp_path / "team.yaml")
+    found = values(legible("score", "-", "--task", tmp_path / "team.yaml", text=layout.to_json()))
+    assert (found["task"], found["robot alone"]) == ("tea for two", "kettle")
+    assert float(found["legibility"]) == pytest.approx(TabletopScorer(team).score_layout(layout)["score"], abs=1e-3)
+    assert "robot alone" not in values(legible("score", "-", text=layout.to_json()))
+
+
 def test_tables_outside_the_design_rules_are_scored_and_said_to_be(tmp_path: Path) -> None:
     layout = TabletopTask.named("columns").layout.with_obstacles([VirtualObstacle((0.45, 0.2), 0.3, (0.2, 0.02))])
     layout.to_json(tmp_path / "mine.json")

@@ -1,5 +1,8 @@
 """The comparison of optimisers: its trials, its statistics against definitions, a whole small run from files."""
 
+import dataclasses
+import shutil
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -16,18 +19,19 @@ from benchmarks.experiments.optimizers.analysis import (
     summary,
 )
 from benchmarks.experiments.optimizers.run import run_search
-from benchmarks.experiments.optimizers.sweep import METHODS, OPTIMUM_5X5, PUBLISHED, trials_of
+from benchmarks.experiments.optimizers.sweep import LEARNED, METHODS, OPTIMUM_5X5, PUBLISHED, trials_of
 from legible_envs.overcooked import OvercookedLayout, OvercookedWorkspace
 from optimizers import list_emitters
 
-TINY = Settings(grids=((5, 5),), seeds=2, budgets=(300,), large=((400, (5, 5), 1),))
+TINY = Settings(grids=((5, 5),), seeds=2, budgets=(300,), large=((400, (5, 5), 1),), learned_budgets=())
 
 
 def test_the_full_comparison_is_that_of_the_issue():
     trials = trials_of(FULL)
     assert {tuple(trial["workspace"]["shape"]) for trial in trials} == {(5, 5), (7, 7), (9, 9), (5, 9)}
     assert {trial["budget"] for trial in trials} == {"paper", "2000", "20000", "200000", "1000000"}
-    assert {trial["method"] for trial in trials} == set(METHODS) <= set(list_emitters())
+    assert {trial["method"] for trial in trials} == {*METHODS, *LEARNED} <= set(list_emitters())
+    assert {trial["budget"] for trial in trials if trial["method"] in LEARNED} == {"2000", "20000"}
     assert {trial["seed"] for trial in trials if trial["budget"] != "200000"} == set(range(10))
     assert {trial["method"] for trial in trials if trial["budget"] == "200000" and trial["seed"] < 10} == set(METHODS)
     assert {trial["method"] for trial in trials if trial["seed"] >= 10} == {"annealing", "improve"}
@@ -84,6 +88,32 @@ def test_analysis_reads_files_alone_and_says_what_came_out(folder, monkeypatch):
     assert "shows 300 evaluations" in words
     assert "rank as published on" in words
     assert all(path.exists() for part in parts for path in part.figures)
+
+
+def test_a_designer_that_learns_joins_and_leaves_other_results_as_they_are(folder, tmp_path):
+    pytest.importorskip("torch")
+    with_learned = dataclasses.replace(TINY, learned_budgets=(300,))
+    shutil.copytree(folder, tmp_path, dirs_exist_ok=True)
+    reproduce(tmp_path, settings=with_learned, workers=1)
+    parts = sections(tmp_path)
+    rows = pd.read_csv(tmp_path / "searches.csv", dtype={"budget": str})
+    before = pd.read_csv(folder / "searches.csv", dtype={"budget": str})
+    learned = rows["method"] == "ppo"
+    assert (rows[learned & (rows["moment"] == "end")]["scored"] >= 300).all()
+    pd.testing.assert_frame_equal(rows[~learned].reset_index(drop=True), before, check_dtype=False)
+    for name in ("leaderboard", "pairs", "ours", "published", "local_search"):
+        path = f"tables/{name}.csv"
+        assert (tmp_path / path).read_bytes() == (folder / path).read_bytes()
+    assert set(pd.read_csv(tmp_path / "tables" / "learned.csv")["method"]) == {*METHODS, "ppo"}
+    assert "`ppo` has place" in parts[-1].text
+
+
+def test_a_designer_that_learns_is_left_out_without_torch(folder, tmp_path, monkeypatch):
+    shutil.copytree(folder, tmp_path, dirs_exist_ok=True)
+    monkeypatch.setattr("benchmarks.experiments.optimizers.run.find_spec", lambda name: None)
+    with pytest.warns(UserWarning, match="left out of the comparison: ppo, which needs PyTorch"):
+        reproduce(tmp_path, settings=dataclasses.replace(TINY, learned_budgets=(300,)), workers=1)
+    assert (tmp_path / "searches.csv").read_bytes() == (folder / "searches.csv").read_bytes()
 
 
 def test_running_it_again_runs_nothing(folder, monkeypatch):

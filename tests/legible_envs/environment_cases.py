@@ -19,13 +19,24 @@ from legible_envs.tabletop.policies import ReachingPlayer
 from tests.legible_envs.tabletop.table_envs import TASK, WALL
 from tests.legible_envs.tabletop.table_player import towards
 
-KITCHEN_ID, TABLE_ID = "LegibleOvercooked-v0", "LegibleTabletop-v0"
-IDS = sorted(name for name, spec in gym.registry.items() if str(spec.entry_point).startswith("legible_envs."))
+KITCHEN_ID, TABLE_ID, DESIGN_ID = "LegibleOvercooked-v0", "LegibleTabletop-v0", "LegibleDesign-v0"
+ALL_IDS = sorted(name for name, spec in gym.registry.items() if str(spec.entry_point).startswith("legible_envs."))
+# Those in which a person moves; the tests of goals, policies and recordings are about these.
+IDS = [name for name in ALL_IDS if name != DESIGN_ID]
 KITCHEN = """\
 XXTXOXX
 C     D
 X  V  X
 F 1   P
+X     X
+X     P
+XXXSXXX"""
+
+DESIGNED = """\
+XXTXOXX
+C     D
+X  V  X
+F     X
 X     X
 X     P
 XXXSXXX"""
@@ -55,6 +66,18 @@ class RandomHand:
             self.speed = self.rng.choice([0.15, 0.6])
         self.steps += 1
         return towards(self.env, self.target, self.speed)
+
+
+class RandomDesigner:
+    """Mostly an edit that the mask allows, now and then any."""
+
+    def __init__(self, env: gym.Env[Any, Any], seed: int) -> None:
+        self.rng = np.random.default_rng(seed)
+
+    def __call__(self, observation: Any, info: dict[str, Any]) -> int:
+        mask = info["action_mask"]
+        allowed = np.flatnonzero(mask) if self.rng.random() < 0.8 else np.arange(len(mask))
+        return int(self.rng.choice(allowed))
 
 
 def scripted(env: gym.Env[Any, Any]) -> Policy:
@@ -116,6 +139,14 @@ KINDS = {
         subtasks=lambda game: game.task.graph.length,
         still=np.zeros(2, dtype=np.float32),
         move=np.full(2, 0.5, dtype=np.float32),
+    ),
+    DESIGN_ID: Kind(
+        random=RandomDesigner,
+        policies={},
+        other=OvercookedLayout.from_ascii(DESIGNED),
+        subtasks=lambda game: game.num_edits,
+        still=0,
+        move=1,
     ),
 }
 
@@ -199,6 +230,14 @@ VARIANTS = [
     ),
 ]
 CASES = [*DEFAULTS, *VARIANTS]
+# Design: tests that hold whether or not anybody moves run over these too.
+DESIGNS = [
+    Case("design", DESIGN_ID),
+    Case("design-vector", DESIGN_ID, {"shape": (5, 6), "obs_type": "vector", "edits": 5, "prefix": "sum"}),
+    Case("design-capped", DESIGN_ID, {"objective": "efficiency", "max_distance": 150.0, "layout": DESIGNED}),
+    Case("design-table", DESIGN_ID, {"workspace": "tabletop", "condition": "placement", "levels": 4, "edits": 12}),
+]
+EVERY = [*CASES, *DESIGNS]
 # What else a spec has to keep: layouts and tasks in all their forms.
 FORMS = [
     Case("kitchen-layout", KITCHEN_ID, {"layout": OvercookedLayout.from_ascii(KITCHEN)}),
@@ -207,4 +246,4 @@ FORMS = [
     Case("table-genome", TABLE_ID, {"layout": WALL.to_genome(), "task": TASK, "max_speed": 2.0}),
     Case("table-task", TABLE_ID, {"task": TASK.to_dict(), "max_speed": 2.0}),
 ]
-BY_NAME = {case.name: case for case in (*CASES, *FORMS)}
+BY_NAME = {case.name: case for case in (*EVERY, *FORMS)}

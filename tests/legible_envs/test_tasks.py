@@ -161,6 +161,7 @@ def test_networkx_export():
         "goals": ("tomato",),
         "then": ("pot",),
         "count": 2,
+        "agents": ("human", "robot"),
         "group": "soup 1",
     }
     assert set(graph.predecessors("soup 2: serve")) == {"soup 2: onion", "soup 2: cabbage"}

@@ -15,6 +15,7 @@ from legible_envs.overcooked import OvercookedLayout
 from legible_envs.rollouts import Trajectory
 from predictors import (
     BayesianGoalPredictor,
+    BehaviourCloning,
     GoalPredictor,
     GridNeighbours,
     MaxEntIRL,
@@ -129,6 +130,7 @@ def _registered(name: str, kind: Literal["kitchen", "reaches"], parameters: Any 
 
 KITCHEN_CASES = [
     _registered("bayesian", "kitchen"),
+    _registered("behaviour-cloning", "kitchen"),
     _registered("grid-knn", "kitchen", uniform=False, blind=False),
     _registered("grid-logistic", "kitchen", uniform=False, blind=False),
     _registered("grid-ngram", "kitchen", uniform=False, blind=False),
@@ -144,6 +146,7 @@ KITCHEN_CASES = [
     Case(BayesianGoalPredictor(costs="soft", cell_costs=MaxEntIRL(l2=2.0)), "kitchen"),
     Case(BayesianGoalPredictor(cell_costs=np.arange(25.0).reshape(5, 5)), "kitchen"),
     Case(MaxEntIRL(prior="empirical"), "kitchen", uniform=False),
+    Case(BehaviourCloning(features=("progress", "back"), prior="empirical", trust="fit"), "kitchen", uniform=False),
     Case(GridNeighbours(k=3), "kitchen", uniform=False, blind=False),
 ]
 """Predictors that need the layout of a kitchen."""

@@ -16,7 +16,7 @@ import pytest
 
 from legible_envs.errors import TaskError
 from legible_envs.task_states import MAX_STEPS
-from legible_envs.tasks import Subtask, TaskGraph
+from legible_envs.tasks import AGENTS, Subtask, TaskGraph
 from legible_envs.workspace import make_workspace
 from optimizers import search
 
@@ -69,11 +69,14 @@ def weights_by_definition(task: TaskGraph) -> tuple[int, dict, int]:
         following = defaultdict(float)
         for state, visit in visits.items():
             steps = [step for step in space.steps(state) if completions(step[3][0])]
-            goals = tuple(sorted({step[1] for step in steps}))
+            goals = tuple(sorted({step[1] for step in steps} - {None}))
             count += len(steps)
             for i, goal, copies, then in steps:
                 share = copies * completions(then[0]) / completions(state[0])
                 following[then] += visit * share
+                if goal is None:  # the robot's
+                    assert state[1] == then[1]
+                    continue
                 weights[state[1], goals, goal, space.classes[i].then] += visit * share
         visits = following
     return completions(space.initial[0]), dict(weights), count
@@ -81,6 +84,7 @@ def weights_by_definition(task: TaskGraph) -> tuple[int, dict, int]:
 
 def random_task(rng: random.Random) -> TaskGraph | None:
     count = rng.randrange(1, 7)
+    able = rng.choice([[AGENTS], [AGENTS, ("human",), ("robot",)]])
     subtasks = [
         Subtask(
             f"s{i}",
@@ -88,6 +92,7 @@ def random_task(rng: random.Random) -> TaskGraph | None:
             tuple(f"s{j}" for j in range(i) if rng.random() < 0.3),
             rng.choice([(), (), ("pot",), ("pot", "serving")]),
             rng.choice([1, 1, 2, 3]),
+            rng.choice(able),
         )
         for i in range(count)
     ]
@@ -98,7 +103,7 @@ def random_task(rng: random.Random) -> TaskGraph | None:
         groups, most = {"one": names[:cut], "two": names[cut:]}, rng.choice([None, 1, 2])
     try:
         return TaskGraph(subtasks, "home", groups, most)
-    except TaskError:  # groups and precedence contradict each other
+    except TaskError:  # groups and precedence contradict each other, or nothing is left to the person
         return None
 
 
@@ -115,7 +120,7 @@ def test_states_of_random_tasks_are_those_of_the_definition(repeats) -> None:
         assert found == pytest.approx(weights, rel=1e-12)
         assert task.states._least_steps() <= max(steps, sum(len(c.goals) * c.count for c in task.states.classes))
         goals = [t.goal for t in task.sample(np.random.default_rng(tried))]
-        assert len(goals) == task.length
+        assert len(goals) == task.num_choices
 
 
 def test_the_largest_tasks_are_counted_and_the_next_refused() -> None:

@@ -10,7 +10,15 @@ import numpy as np
 from benchmarks.csv_tables import write_tables
 from benchmarks.experiments.optimizers import narrative
 from benchmarks.experiments.optimizers.figures import anytime_figure
-from benchmarks.experiments.optimizers.sweep import LOCAL_SEARCH, METHODS, OPTIMUM_5X5, OURS, PAPER_METHODS, PUBLISHED
+from benchmarks.experiments.optimizers.sweep import (
+    LEARNED,
+    LOCAL_SEARCH,
+    METHODS,
+    OPTIMUM_5X5,
+    OURS,
+    PAPER_METHODS,
+    PUBLISHED,
+)
 from benchmarks.reports.experiment_report import Section
 from legible_envs.drawing.charts import save_figure
 from predictors.evaluation.statistics import hedges_g, holm
@@ -24,6 +32,7 @@ __all__ = [
     "beside_published",
     "gaps",
     "leaderboard",
+    "learned_beside",
     "ours_against",
     "pairwise",
     "sections",
@@ -53,6 +62,8 @@ def sections(folder: str | Path) -> list[Section]:
     ours, board = ours_against(pairs, "improve"), leaderboard(best)
     tables = {"summary": best, "leaderboard": board, "pairs": pairs, "ours": ours, "gaps": gap}
     tables |= {"published": published, "local_search": local, "anytime": curves}
+    learned = learned_beside(best)
+    tables |= {} if learned.empty else {"learned": learned}
     write_tables(folder / "tables", tables.items())
     drawn = []
     for (grid, budget), part in curves.groupby(["grid", "budget"], sort=False):
@@ -61,7 +72,7 @@ def sections(folder: str | Path) -> list[Section]:
         figure = anytime_figure(part, title=f"Best layout so far, {grid}, {int(str(budget)):,} evaluations")
         drawn.append(folder / "figures" / f"anytime_{grid}_{budget}.svg")
         save_figure(drawn[-1], figure)
-    return [
+    parts = [
         Section(
             "What each search finds",
             narrative.about_searches(board),
@@ -77,6 +88,10 @@ def sections(folder: str | Path) -> list[Section]:
         Section("Beside a plain local search", narrative.about_local_search(), {f"Searches by `{OURS}`": local}),
         Section("Beside the paper", narrative.about_published(published), {"Ranks of the paper's methods": published}),
     ]
+    if not learned.empty:
+        text = narrative.about_learned(learned)
+        parts.append(Section("A designer that learns", text, {"Best score: mean (standard deviation)": learned}))
+    return parts
 
 
 # -- tables -----------------------------------------------------------------------------------------------------------
@@ -110,7 +125,8 @@ def pairwise(ends: pd.DataFrame) -> pd.DataFrame:
         Columns ``grid, budget, a, b, difference`` (of means, a - b), ``superiority`` (Vargha and Delaney's A: the
         probability that a search by ``a`` ends better than one by ``b``, ties counting half), ``hedges_g``
         (infinite or 0 where nothing varies, see :func:`predictors.evaluation.statistics.hedges_g`), ``p`` and
-        ``p_holm`` (Holm's correction over all pairs at that grid and budget).
+        ``p_holm`` (Holm's correction over all pairs at that grid and budget). Designers that learn are not among them:
+        they run at few budgets, where they are installed, and would change the corrected p of the others.
     """
     import pandas as pd
     from scipy.stats import mannwhitneyu
@@ -150,20 +166,34 @@ def leaderboard(best: pd.DataFrame) -> pd.DataFrame:
     """Best scores at the largest budget that every method was given, a row per method and a column per grid.
 
     Args:
-        best: What :func:`summary` returns.
+        best: What :func:`summary` returns; designers that learn are left out, as they run at small budgets only.
 
     Returns:
         Columns ``method``, ``budget``, and a text ``"mean (sd)"`` for each grid; ordered by their mean rank.
     """
     import pandas as pd
 
-    equal = best[best["budget"] != "paper"]
+    equal = best[(best["budget"] != "paper") & ~best["method"].isin(LEARNED)]
     shared = equal.groupby("budget", sort=False)["method"].nunique()
     shared = shared[shared == equal["method"].nunique()]
     if shared.empty:
         return pd.DataFrame(columns=["method", "budget"])
-    budget = max(shared.index, key=int)
-    own = equal[equal["budget"] == budget]
+    return _by_grid(equal, max(shared.index, key=int))
+
+
+def learned_beside(best: pd.DataFrame) -> pd.DataFrame:
+    """The leaderboard at the largest budget of designers that learn, with them; empty where none was run.
+
+    Args:
+        best: What :func:`summary` returns.
+    """
+    ran = best[best["method"].isin(LEARNED)]
+    return ran[["method", "budget"]] if ran.empty else _by_grid(best, max(ran["budget"], key=int))
+
+
+def _by_grid(best: pd.DataFrame, budget: str) -> pd.DataFrame:
+    """Best scores at one budget, a row per method and a column per grid, ordered by their mean rank."""
+    own = best[best["budget"] == budget]
     own = own.assign(text=[f"{mean:.1f} ({sd:.1f})" for mean, sd in zip(own["best"], own["best_sd"], strict=True)])
     table = own.pivot(index="method", columns="grid", values="text")[list(dict.fromkeys(own["grid"]))]
     ranks = own["best"].round(9).groupby(own["grid"]).rank(ascending=False).groupby(own["method"]).mean()

@@ -4,13 +4,20 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from benchmarks.experiments.optimizers.sweep import OPTIMUM_5X5, OURS
+from benchmarks.experiments.optimizers.sweep import LEARNED, OPTIMUM_5X5, OURS
 from benchmarks.reports.narrative import narrate
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["about_differences", "about_local_search", "about_optimum", "about_published", "about_searches"]
+__all__ = [
+    "about_differences",
+    "about_learned",
+    "about_local_search",
+    "about_optimum",
+    "about_published",
+    "about_searches",
+]
 
 
 def about_searches(board: pd.DataFrame) -> str:
@@ -32,6 +39,12 @@ def about_optimum(gap: pd.DataFrame) -> str:
         methods = part.loc[part["reached"] == 1.0, "method"].tolist()
         budgets.append({"budget": str(budget), "methods": methods, "all": len(methods) == len(part)})
     return narrate("optimizers/optimum", optimum=OPTIMUM_5X5, budgets=budgets)
+
+
+def about_learned(learned: pd.DataFrame) -> str:
+    """What a designer that learns is, and where it stands."""
+    places = [(name, place) for place, name in enumerate(learned["method"], 1) if name in LEARNED]
+    return narrate("optimizers/learned", budget=int(learned["budget"].iloc[0]), places=places, count=len(learned))
 
 
 def about_local_search() -> str:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
+import warnings
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Unpack
 
-from benchmarks.experiments.optimizers.sweep import FULL, QUICK, Settings, trials_of
+from benchmarks.experiments.optimizers.sweep import FULL, LEARNED, QUICK, Settings, trials_of
 from benchmarks.experiments.running import Rows, RunOptions, log_trials
 from benchmarks.trials import TrialName, trial_function
 
@@ -36,6 +39,9 @@ def reproduce(
         settings: In place of the full or quick ones.
         how: ``workers``, ``scheduler`` and ``progress`` of :func:`benchmarks.trials.run_trials`.
 
+    Warns:
+        UserWarning: PyTorch is not installed: designers that learn are left out.
+
     Raises:
         TrialsFailed: Some trials failed; everything else is finished and on disk.
         ValueError: Fewer than two seeds: nothing could be said about methods.
@@ -45,6 +51,12 @@ def reproduce(
         settings = settings.with_seeds(seeds)
     if settings.seeds < 2:
         raise ValueError(f"methods are compared by their searches: 2 seeds or more are needed, got {settings.seeds}")
+    if settings.learned_budgets and find_spec("torch") is None:
+        settings = dataclasses.replace(settings, learned_budgets=())
+        warnings.warn(
+            f'left out of the comparison: {", ".join(LEARNED)}, which needs PyTorch: pip install "legible-envs[torch]"',
+            stacklevel=2,
+        )
     log_trials(run_search, trials_of(settings), Path(folder) / "searches.csv", hidden=_HIDDEN, **how)
 
 

@@ -10,6 +10,7 @@ from typing import Any, Final, NamedTuple
 
 __all__ = [
     "FULL",
+    "LEARNED",
     "LOCAL_SEARCH",
     "METHODS",
     "OPTIMUM_5X5",
@@ -35,6 +36,9 @@ METHODS: Final = (
     "random",
 )
 """Emitters compared, by their registered names; the first is our own, ``improve`` is the paper's MAP-Elites."""
+
+LEARNED: Final = ("ppo",)
+"""Designers that learn as they search, beside the emitters above. They need PyTorch, and are left out without it."""
 
 OURS: Final = "annealing"
 
@@ -67,6 +71,7 @@ class Settings:
         large: Larger budgets, or more seeds at one of ``budgets``, each with its grid and number of seeds; few methods
             run them, as they take time.
         large_methods: These methods.
+        learned_budgets: Those of ``budgets`` that designers that learn are given too: they take much longer.
         iterations: Whether the paper's budgets in iterations are run too.
         prefix: Which prefixes count in the score; see ``OvercookedWorkspace``.
     """
@@ -82,6 +87,7 @@ class Settings:
         (1_000_000, (5, 9), 10),
     )
     large_methods: tuple[str, ...] = (OURS, "improve")
+    learned_budgets: tuple[int, ...] = (2_000, 20_000)
     iterations: bool = True
     prefix: str = "sum"
 
@@ -92,9 +98,10 @@ class Settings:
 
 
 FULL: Final = Settings()
-"""About half an hour on two idle cores: a million evaluations only for our emitter and the paper's."""
+"""About an hour on two idle cores, half of it for designers that learn, which need PyTorch; a million evaluations only
+for our emitter and the paper's."""
 
-QUICK: Final = Settings(grids=((5, 5), (7, 7)), seeds=3, budgets=(2_000, 8_000), large=())
+QUICK: Final = Settings(grids=((5, 5), (7, 7)), seeds=3, budgets=(2_000, 8_000), large=(), learned_budgets=())
 """A minute or two on two idle cores: small grids, three seeds, no large budgets."""
 
 PAPER_BUDGETS: Final[Mapping[str, dict[str, Any]]] = {
@@ -127,6 +134,8 @@ def trials_of(settings: Settings) -> list[dict[str, Any]]:
     if settings.iterations:
         jobs.append(_Job("paper", None, settings.seeds, settings.grids, tuple(PAPER_BUDGETS)))
     jobs += [_Job(f"{n}", n, settings.seeds, settings.grids, METHODS) for n in settings.budgets]
+    learned = [n for n in settings.budgets if n in settings.learned_budgets]
+    jobs += [_Job(f"{n}", n, settings.seeds, settings.grids, LEARNED) for n in learned]
     jobs += [_Job(f"{n}", n, seeds, (shape,), settings.large_methods) for n, shape, seeds in settings.large]
     trials: dict[str, dict[str, Any]] = {}
     for budget, evaluations, seeds, grids, methods in jobs:

@@ -38,6 +38,8 @@ PREDICTORS: Final = (
     PredictorSetting("Eq. 1 (soft costs, prior)", "bayesian", {"beta": 1.0, "costs": "soft", "prior": "empirical"}),
     PredictorSetting("MaxEnt IRL", "maxent-irl"),
     PredictorSetting("MaxEnt IRL with prior", "maxent-irl", {"prior": "empirical"}),
+    PredictorSetting("behaviour cloning", "behaviour-cloning"),
+    PredictorSetting("behaviour cloning with prior", "behaviour-cloning", {"prior": "empirical", "trust": "fit"}),
     PredictorSetting("n-gram", "grid-ngram"),
     PredictorSetting("k-NN", "grid-knn"),
     PredictorSetting("logistic", "grid-logistic"),

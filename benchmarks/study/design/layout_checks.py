@@ -10,6 +10,7 @@ import numpy as np
 from benchmarks.study.design.draft import SETTINGS, Draft
 from benchmarks.study.design.partner_checks import task_of
 from legible_envs.errors import LayoutError
+from legible_envs.subtasks import HUMAN, ROBOT
 
 if TYPE_CHECKING:
     from legible_envs.tabletop.layout import TabletopLayout
@@ -125,7 +126,7 @@ def _checked_task(draft: Draft) -> TabletopTask | None:
 
 def _check_reaches(draft: Draft, task: TabletopTask) -> None:
     """Warn where more reaches are wanted than a participant can make; a robot makes some of them, too."""
-    content, objects = draft.content, len(task.graph.goals)
+    content, objects = draft.content, len(task.graph.goals_of(HUMAN))
     shared = "; the robot takes some of them, too" if content.partner is not None else ""
     most = objects * content.rounds.per_condition
     if content.rounds.reaches > most:
@@ -151,6 +152,8 @@ def _check_table(draft: Draft, text: str, task: TabletopTask) -> None:
     table = TabletopLayout.from_dict(parse_json(text))
     settings = draft.content.table.model_dump()
     settings.pop("task")
+    if draft.content.partner is not None and task.graph.reserved_for(ROBOT):
+        settings["partner"] = "robot"  # any will do to see that there is one
     for layout in _as_played(draft, table, table.with_obstacles(())):
         most = max(MAX_OBSTACLES, len(layout.obstacles))
         TabletopEnv(task=task, layout=layout, max_obstacles=most, **settings).close()

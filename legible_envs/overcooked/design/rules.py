@@ -65,6 +65,7 @@ class DesignRules:
         self.forbidden = self._checked_forbidden(forbidden)
         self.locked = self._checked_locked(locked)
         self._slot_of = {cell: slot for slot, cell in enumerate(self.slots)}
+        self._slot_cells = np.array([row * cols + col for row, col in self.slots], dtype=np.intp)
         self.geometry = self._geometry()
 
     # -- checking the arguments ------------------------------------------------------------------------------------
@@ -235,6 +236,16 @@ class DesignRules:
         for name, slot in zip(self.stations, genome[:n], strict=True):
             cells[self.slots[int(slot)]] = STATION_CODES[name]
         return OvercookedLayout(cells)
+
+    def cells(self, genomes: npt.NDArray[Any]) -> npt.NDArray[np.int8]:
+        """``(n, H, W)`` cell codes of ``(n, d)`` valid genomes, which are not checked."""
+        rows, cols = self.shape
+        cells = np.full((len(genomes), rows * cols), COUNTER, dtype=np.int8)
+        cells[:, self.geometry.inner] = np.where(genomes[:, len(self.stations) :] != 0, OBSTACLE, FLOOR)
+        slots = self._slot_cells[genomes[:, : len(self.stations)].astype(np.intp)]
+        codes = np.array([STATION_CODES[name] for name in self.stations], dtype=np.int8)
+        np.put_along_axis(cells, slots, codes[None], axis=1)
+        return cells.reshape(-1, rows, cols)
 
     def encode(self, layout: OvercookedLayout) -> Genomes:
         """The ``(d,)`` genome of a layout.

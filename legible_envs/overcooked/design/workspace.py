@@ -18,7 +18,7 @@ from legible_envs.overcooked.design.keys import KitchenKeys
 from legible_envs.overcooked.design.rules import DesignRules, Genomes
 from legible_envs.overcooked.grid import Cell
 from legible_envs.overcooked.kitchen_file import KitchenFile
-from legible_envs.overcooked.layout import INGREDIENTS, STATION_TYPES, OvercookedLayout
+from legible_envs.overcooked.layout import INGREDIENTS, STATION_TYPES, SYMBOLS, OvercookedLayout
 from legible_envs.overcooked.recipes import PAPER_SOUPS, check_recipes, soup_task
 from legible_envs.overcooked.scoring.boltzmann import HumanModel, HumanName
 from legible_envs.overcooked.scoring.genome_kernels import score_genomes, valid_genomes
@@ -395,6 +395,21 @@ class OvercookedWorkspace(Workspace):
         See :meth:`summary` for the arguments.
         """
         return self.scorer.ambiguity(self._one(genome), player=player)
+
+    def draw(self, genome: npt.ArrayLike | OvercookedLayout) -> npt.NDArray[np.uint8]:
+        """``(48 H, 48 W, 3)`` picture of one kitchen."""
+        from legible_envs.overcooked.rendering.board import draw_layout
+
+        return draw_layout(self._one(genome), starts=False)
+
+    def cells(self, genomes: npt.NDArray[Any]) -> npt.NDArray[np.int8]:
+        """``(n, H, W)`` cell codes of :mod:`legible_envs.overcooked.layout`, of ``(n, d)`` valid genomes."""
+        return self.rules.cells(as_batch(genomes, self.genome_size))
+
+    @property
+    def num_cell_codes(self) -> int:
+        """How many cell codes there are: floor, counter, virtual obstacle, and each type of station."""
+        return len(SYMBOLS)
 
     # -- configuration ---------------------------------------------------------------------------------------------
 

@@ -12,7 +12,8 @@ import numpy.typing as npt
 
 from legible_envs.overcooked.game.dynamics import is_over, start, step
 from legible_envs.overcooked.game.goals import find_actions, find_goals
-from legible_envs.overcooked.game.observations import grid_observation, redraw_motion, vector_observation
+from legible_envs.overcooked.game.observations import grid_observation, redraw_motion
+from legible_envs.overcooked.game.observations import vector_observations as observe_game
 from legible_envs.overcooked.game.vectors import AT_PLAYERS, NUM_PLAYERS, STEPS, Kitchen, Vector
 from legible_envs.support.compiled import kernel
 
@@ -237,8 +238,7 @@ def vector_observations(
 ) -> None:
     """Write the ``(N, P, D)`` vector observations of ``N`` games; ``routes`` ``(N, 7, 2, H*W)``, ``out`` zeros."""
     for i in range(states.shape[0]):
-        for player in range(rules[NUM_PLAYERS]):
-            vector_observation(states[i], kitchens[i], rules, routes[i], player, out[i, player])
+        observe_game(states[i], kitchens[i], rules, routes[i], out[i])
 
 
 @kernel

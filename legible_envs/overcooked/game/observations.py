@@ -38,8 +38,10 @@ __all__ = [
     "OTHER_CHANNELS",
     "find_routes",
     "grid_observation",
+    "grid_observations",
     "redraw_motion",
     "vector_observation",
+    "vector_observations",
 ]
 
 GRID_CHANNELS: Final = (
@@ -113,6 +115,13 @@ def grid_observation(state: Vector, kitchen: Kitchen, rules: Vector, observer: i
         for kind in range(4):
             if state[pot] >= 0:
                 grid[state[pot] // width, state[pot] % width, CONTENTS + kind] = state[pot + 1 + kind]
+
+
+@kernel
+def grid_observations(state: Vector, kitchen: Kitchen, rules: Vector, grids: npt.NDArray[np.uint8]) -> None:
+    """Write what each player sees; ``grids`` ``(players, H, W, C)``, zeros."""
+    for player in range(rules[NUM_PLAYERS]):
+        grid_observation(state, kitchen, rules, player, grids[player])
 
 
 @kernel
@@ -284,3 +293,12 @@ def vector_observation(
     for order in range(rules[NUM_ORDERS]):
         if state[rules[AT_ORDERS] + order] != 2:
             out[NUM_FEATURES + order] = 1.0
+
+
+@kernel
+def vector_observations(
+    state: Vector, kitchen: Kitchen, rules: Vector, routes: npt.NDArray[np.int16], out: npt.NDArray[np.float32]
+) -> None:
+    """Write what each player sees; ``out`` ``(players, D)``, zeros."""
+    for player in range(rules[NUM_PLAYERS]):
+        vector_observation(state, kitchen, rules, routes, player, out[player])

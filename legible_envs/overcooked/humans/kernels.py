@@ -1,24 +1,27 @@
 """Kernels of simulated participants: their next step, whole paths, and how long these take.
 
 Cells are flat indices of an ``H x W`` grid; directions are actions, 0 N, 1 S, 2 E, 3 W. How a person decides is a kind
-and a vector of parameters: ``BOLTZMANN`` ``[rationality]``, ``PLANNER`` ``[depth, turn_cost, recency, fade, slip]``.
-The models are explained in ``humans``.
+and a vector of parameters: ``BOLTZMANN`` ``[rationality]``, ``PLANNER`` ``[depth, turn_cost, recency, fade, slip]``,
+``CLONED`` the weights of the features in ``policy_kernels``. The models are explained in ``humans``.
 """
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from legible_envs.overcooked.game.vectors import INTERACT, STAY
 from legible_envs.overcooked.grid_kernels import neighbour
+from legible_envs.overcooked.humans.field_kernels import GoalField, is_option
+from legible_envs.overcooked.humans.policy_kernels import cloned_weights
 from legible_envs.support.compiled import kernel
 from legible_envs.support.random_kernels import Bits, random
 
 __all__ = [
     "BOLTZMANN",
+    "CLONED",
     "PLANNER",
     "GoalField",
     "choose_action",
@@ -31,35 +34,10 @@ __all__ = [
 
 BOLTZMANN: Final = 0
 PLANNER: Final = 1
+CLONED: Final = 2
 
 Floats = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
-
-
-class GoalField(NamedTuple):
-    """All that a person needs to know of the kitchen to reach one goal; ``n = H * W``.
-
-    Attributes:
-        height: Rows of the grid.
-        width: Columns of the grid.
-        floor: ``[n]`` where the person may stand.
-        costs: ``[n]`` cost of stepping on each cell.
-        station: Cell of the goal.
-        cost_to_go: ``[n]`` least cost from each cell into the goal; ``inf`` where no path leads.
-    """
-
-    height: int
-    width: int
-    floor: Flags
-    costs: Floats
-    station: int
-    cost_to_go: Floats
-
-
-@kernel
-def is_option(after: int, field: GoalField) -> bool:
-    """Whether a person who goes there may step on a cell: into the goal, or onto floor from which it can be reached."""
-    return after >= 0 and (after == field.station or (field.floor[after] and field.cost_to_go[after] < np.inf))
 
 
 @kernel
@@ -151,7 +129,7 @@ def choose_step(
     """The direction of the next step.
 
     Args:
-        kind: ``BOLTZMANN`` or ``PLANNER``.
+        kind: ``BOLTZMANN``, ``PLANNER`` or ``CLONED``.
         params: The person; see the module.
         cell: A cell from which the goal can be reached.
         heading: Direction of the step before, -1 for none.
@@ -162,6 +140,8 @@ def choose_step(
     """
     if kind == BOLTZMANN:
         boltzmann_weights(cell, field, params[0], weights)
+    elif kind == CLONED:
+        cloned_weights(cell, heading, field, params, weights)
     else:
         memory *= params[3]
         memory[cell] += 1.0

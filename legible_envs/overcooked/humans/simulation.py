@@ -1,11 +1,12 @@
-"""Simulated participants in kitchens: two models of how people walk, differences between them, and whole tasks.
+"""Simulated participants in kitchens: models of how people walk, differences between them, and whole tasks.
 
 :class:`BoltzmannWalker` is the noisily rational walker that ``human="boltzmann"`` scores and
 :func:`fit_rationality` fits to recorded play. :class:`PlannerWalker` errs for other reasons: it sees only a few steps
-ahead, dislikes turning, and avoids where it has just been. A layout, or a predictor, that was made with one model
-should be evaluated with the other, too.
+ahead, dislikes turning, and avoids where it has just been. :class:`~legible_envs.overcooked.humans.ClonedWalker` walks
+as recorded people were seen to. A layout, or a predictor, that was made with one model should be evaluated with the
+others, too.
 
-Both walk from station to station: floor cells, then the goal station. Time passes in ticks. Before each step a person
+All walk from station to station: floor cells, then the goal station. Time passes in ticks. Before each step a person
 stands idle or looks around for a while (each tick with probability ``idle`` and ``turn``); a step takes a tick and
 turns the person, using the goal takes one, and one more where the person does not face it. In recorded play the
 ticks of a trajectory are moves (23 %), turns on the spot (6 %), idle (63 %) and uses of stations.
@@ -20,6 +21,7 @@ from typing import Any, Final, Literal
 import numpy as np
 import numpy.typing as npt
 
+from legible_envs.overcooked.humans.cloning import ClonedWalker
 from legible_envs.overcooked.humans.fitting import (
     RationalityFit,
     RationalitySpread,
@@ -176,10 +178,11 @@ class PlannerWalker(Walker):
         return cls(preferences=draw_preferences(shape, rng, preference), **{**drawn, **arguments})
 
 
-PopulationName = Literal["boltzmann", "planner"]
+PopulationName = Literal["boltzmann", "planner", "cloned"]
 _POPULATIONS: Final[Mapping[str, Callable[..., Walker]]] = {
     "boltzmann": BoltzmannWalker.draw,
     "planner": PlannerWalker.draw,
+    "cloned": ClonedWalker.draw,
 }
 
 
@@ -211,13 +214,14 @@ def simulate_participants(
         rng: Source of all randomness.
         task: The task over station types; the paper's three soups if None.
         player: Whose part of the kitchen the participants are in, by the number of their start.
-        population: Each participant is drawn anew from it: ``"boltzmann"`` (also None) or ``"planner"``, or a
-            callable that makes one participant's walker, called with (shape, rng).
+        population: Each participant is drawn anew from it: ``"boltzmann"`` (also None), ``"planner"`` or ``"cloned"``,
+            or a callable that makes one participant's walker, called with (shape, rng).
         executions: How often each participant does the task; all together do at most a million.
         participant: Names are ``"{participant}/0"``, ``"{participant}/1"``, ….
         condition: Of all trajectories.
         layout_name: Of all trajectories.
-        **settings: Of the population: arguments of :meth:`BoltzmannWalker.draw` or :meth:`PlannerWalker.draw`.
+        **settings: Of the population: arguments of :meth:`BoltzmannWalker.draw`, :meth:`PlannerWalker.draw` or
+            :meth:`ClonedWalker.draw <legible_envs.overcooked.humans.ClonedWalker.draw>`.
 
     Raises:
         LayoutError: The player cannot do the task in this kitchen (names types and places), or there is no such player.

@@ -32,6 +32,7 @@ from legible_envs.overcooked.scoring.boltzmann import (
     boltzmann_legibility,
     boltzmann_trajectories,
 )
+from legible_envs.subtasks import HUMAN
 from legible_envs.support.validation import shown
 from legible_envs.tasks import TaskGraph
 
@@ -159,7 +160,7 @@ def human_model(layout: OvercookedLayout, human: HumanModel | HumanName) -> Huma
 
 
 def layout_distance(layout: OvercookedLayout, task: TaskGraph, *, player: int = 1) -> float:
-    """Expected number of floor moves of one task execution in a uniformly random valid sequence.
+    """Expected number of a person's floor moves in one task execution, in a uniformly random valid sequence.
 
     Where a type repeats: a goal is any of its stations, equally likely; every other stop is the nearest of its type.
 
@@ -173,7 +174,7 @@ def layout_distance(layout: OvercookedLayout, task: TaskGraph, *, player: int = 
     """
     reach = reach_of(layout, player)
     reach.check_task(task)
-    goals = set(task.goals)
+    goals = set(task.goals_of(HUMAN))
     total = []
     for (a, b), expected in task.legs().items():
         moves = []

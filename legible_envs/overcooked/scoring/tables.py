@@ -11,6 +11,7 @@ from legible_envs.errors import TaskError
 from legible_envs.legibility import prefix_weights
 from legible_envs.observer import ObserverModel, PrefixSpec, Ties
 from legible_envs.overcooked.scoring.exact_kernels import ScoreTables
+from legible_envs.subtasks import HUMAN
 from legible_envs.tasks import TaskGraph
 
 __all__ = ["check_task", "make_tables"]
@@ -22,13 +23,14 @@ def check_task(task: TaskGraph, stations: Sequence[str]) -> None:
     """Check that a task can be done with these types of stations, and scored.
 
     Raises:
-        TaskError: The task names a place that is no station, or has more than 12 goals.
+        TaskError: The task names a place that is no station, or has more than 12 goals for the person.
     """
     unknown = [place for place in task.places if place not in stations]
     if unknown:
         raise TaskError(f"the task needs {unknown}, which the kitchen lacks; its stations are {list(stations)}")
-    if len(task.goals) > MAX_GOALS:
-        raise TaskError(f"at most {MAX_GOALS} different goals are supported, the task has {len(task.goals)}")
+    goals = task.goals_of(HUMAN)
+    if len(goals) > MAX_GOALS:
+        raise TaskError(f"at most {MAX_GOALS} different goals are supported, the task has {len(goals)}")
 
 
 def make_tables(task: TaskGraph, stations: Sequence[str], observer: ObserverModel, *, num_floor: int) -> ScoreTables:
@@ -44,7 +46,7 @@ def make_tables(task: TaskGraph, stations: Sequence[str], observer: ObserverMode
         TaskError: See :func:`check_task`.
     """
     check_task(task, stations)
-    goals = task.goals
+    goals = task.goals_of(HUMAN)
     stages = task.stages()
     starts = sorted({stage.start for stage in stages})
     weights = np.zeros((len(starts), 1 << len(goals)))

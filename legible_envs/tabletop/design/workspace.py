@@ -15,6 +15,7 @@ from legible_envs.errors import LayoutError
 from legible_envs.key_space import KeySpace
 from legible_envs.observer import ObserverModel, Ties
 from legible_envs.rollouts.trajectory import Trajectory
+from legible_envs.subtasks import HUMAN
 from legible_envs.support.random_bits import call_drawing
 from legible_envs.support.validation import choice, entries, flag, real, shown
 from legible_envs.tabletop.design import genome_kernels as kernels
@@ -181,7 +182,8 @@ class TabletopWorkspace(Workspace):
         objects = self.task.layout.objects
         movable = [o.name for o in objects if o.movable]
         if ranked is None:
-            first = {goal for subtask in self.task.graph.subtasks if not subtask.after for goal in subtask.goals}
+            persons = self.task.graph.subtasks_of(HUMAN)
+            first = {goal for subtask in persons if not subtask.after for goal in subtask.goals}
             ranked = [name for name in movable if name in first] or movable
         names = tuple(movable if isinstance(ranked, str) and ranked == "all" else entries(ranked))
         are_objects = all(isinstance(name, str) and name in self.task.layout.goals for name in names)
@@ -405,6 +407,12 @@ class TabletopWorkspace(Workspace):
 
     def _one(self, genome: npt.ArrayLike | TabletopLayout) -> TabletopLayout:
         return self.decode(self.encode(genome) if isinstance(genome, TabletopLayout) else genome)
+
+    def draw(self, genome: npt.ArrayLike | TabletopLayout) -> npt.NDArray[np.uint8]:
+        """``(height, 640, 3)`` picture of one table, with the places to build at."""
+        from legible_envs.tabletop.rendering.table import draw_table
+
+        return draw_table(self._one(genome), task=self.task)
 
     def summary(self, genome: npt.ArrayLike | TabletopLayout) -> dict[str, Any]:
         """Score, distance and what belongs beside them.

@@ -142,7 +142,7 @@ class TableGame:
         """Objects that a robot may validly take now: those that lie free and belong to a point."""
         return tuple(
             name
-            for name, delivery in self.progress.goals.items()
+            for name, delivery in self.progress.robot_goals.items()
             if self.status[self.index[name]] == FREE and delivery.kind == "slot"
         )
 
@@ -287,7 +287,7 @@ class TableGame:
         """Take an object into the gripper; False where the robot may not."""
         if self._robot_delivery is not None or name not in self.robot_goals:
             return False
-        self._robot_delivery = self.progress.goals[name]
+        self._robot_delivery = self.progress.robot_goals[name]
         self.progress.begin(self._robot_delivery)
         self.physics.take(self.index[name])
         self.status[self.index[name]] = ROBOT

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from legible_envs.errors import TaskError
+from legible_envs.subtasks import HUMAN, ROBOT
 from legible_envs.tabletop.objects import Point
 from legible_envs.tabletop.task import TabletopTask
 
@@ -37,7 +38,7 @@ class TaskProgress:
 
     A subtask is *begun* when its goal is taken, *done* when the goal is where it belongs. A subtask that
     waits for others may be begun when they are done, and only once. A subtask is begun only if the task can still be
-    finished afterwards.
+    finished afterwards, and only by an agent who can perform it.
 
     Where an object that is taken belongs: to its place in the task's ``configuration``; else, if the subtask names
     places to go to afterwards, to the last of these (anywhere in the assembly zone if that is ``assembly``); else, if
@@ -48,7 +49,8 @@ class TaskProgress:
         task: The task.
 
     Raises:
-        TaskError: An object is to be carried to a goal that is itself to be carried.
+        TaskError: An object is to be carried to a goal that is itself to be carried; or only a robot can perform a
+            subtask that does not carry an object to a point, which is all that a robot does on a table.
 
     Attributes:
         task: The task.
@@ -61,7 +63,7 @@ class TaskProgress:
         self.task = task
         self._space = task.graph.states
         self._can_finish = {done: orders > 0 for done, orders in self._space.completions.items()}
-        self._goals: dict[tuple[tuple[int, ...], tuple[int, ...]], dict[str, Delivery]] = {}
+        self._goals: dict[tuple[str, tuple[int, ...], tuple[int, ...]], dict[str, Delivery]] = {}
         self._deliveries = {
             (number, goal): self._delivery(number, goal)
             for number, cls in enumerate(self._space.classes)
@@ -88,22 +90,28 @@ class TaskProgress:
 
     @property
     def goals(self) -> dict[str, Delivery]:
-        """Goals that may be reached for now, sorted by name, each with where it belongs; not to be changed."""
-        return self._goals_at(self.done, self.begun)
+        """The person's valid goals now, sorted by name, each with where it belongs; not to be changed."""
+        return self._goals_at(HUMAN, self.done, self.begun)
+
+    @property
+    def robot_goals(self) -> dict[str, Delivery]:
+        """The same for the robot."""
+        return self._goals_at(ROBOT, self.done, self.begun)
 
     @property
     def first_goals(self) -> tuple[str, ...]:
-        """Goals that may be reached for at the beginning."""
+        """Goals that the person may reach for at the beginning."""
         nothing = self._space.initial[0]
-        return tuple(self._goals_at(nothing, nothing))
+        return tuple(self._goals_at(HUMAN, nothing, nothing))
 
-    def _goals_at(self, done: tuple[int, ...], begun: tuple[int, ...]) -> dict[str, Delivery]:
-        key = done, begun
+    def _goals_at(self, agent: str, done: tuple[int, ...], begun: tuple[int, ...]) -> dict[str, Delivery]:
+        key = agent, done, begun
         if key not in self._goals:
             found: dict[str, Delivery] = {}
             for number in sorted({*self._space.ready(done)} & {*self._space.ready(begun)}):
-                if self._can_finish.get(_one_more(begun, number), False):
-                    for goal in self._space.classes[number].goals:
+                cls = self._space.classes[number]
+                if agent in cls.agents and self._can_finish.get(_one_more(begun, number), False):
+                    for goal in cls.goals:
                         found.setdefault(goal, self._deliveries[number, goal])
             self._goals[key] = dict(sorted(found.items()))
         return self._goals[key]
@@ -142,6 +150,12 @@ class TaskProgress:
                         f"task {self.task.name!r}: {goal!r} is to be carried to {name!r}, which is carried itself; "
                         "a hand holds one object"
                     )
+            if HUMAN not in self._space.classes[number].agents and delivery.kind != "slot":
+                raise TaskError(
+                    f"task {self.task.name!r}: only a robot can perform the subtask with the goal {goal!r}, and a "
+                    f"robot carries objects to a point; give {goal!r} a place in the configuration, or let the "
+                    "person perform it"
+                )
 
     def _delivery(self, number: int, goal: str) -> Delivery:
         cls, table = self._space.classes[number], self.task.layout.table

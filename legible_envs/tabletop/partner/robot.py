@@ -48,12 +48,14 @@ class RobotPartner:
 
     It waits at home until it is *sure*: until one goal is more probable than ``threshold``, or the person holds an
     object. Then it takes another one: the nearest to its gripper of those it may validly take, never the one the
-    person goes for; puts it at its place in the task's configuration; and goes on while it is sure. Its states:
+    person goes for; puts it at its place in the task's configuration; and goes on while it is sure. An object that the
+    person may not reach for at present, since only the robot can perform its subtask, it takes without waiting. Its
+    states:
 
     =========  ==================================================  ====================================================
     state      action                                              end of it
     =========  ==================================================  ====================================================
-    wait       goes home and stays there                           sure, and there is another object: *approach*
+    wait       goes home and stays there                           there is an object to take: *approach*
     approach   goes to its target                                  there: *grasp*
     grasp      stands still for ``grasp_time``, closes             caught: *carry*; missed: *approach*
     carry      goes to the place of what it holds                  there: *place*
@@ -201,15 +203,17 @@ class RobotPartner:
         if self._state in ("approach", "grasp") and (self._target not in senses.free or self._target == predicted):
             conflict = senses.person_holding == self._target
             self._state, self._target = "wait", None
-        if self._state == "wait" and predicted is not None:
+        if self._state == "wait":
             self._target = self._choose(senses, predicted)
             self._state = "wait" if self._target is None else "approach"
         return conflict
 
-    def _choose(self, senses: Senses, predicted: str) -> str | None:
-        """The nearest object to take that is not the person's."""
+    def _choose(self, senses: Senses, predicted: str | None) -> str | None:
+        """The nearest object to take that is not the person's; while not sure, one that cannot be."""
         gripper = _pair(senses.gripper)
         options = [name for name in senses.free if name != predicted and name in self._place]
+        if predicted is None:
+            options = [] if senses.person_holding is not None else [n for n in options if n not in senses.goals]
         return min(
             options, key=lambda name: (math.dist(gripper, senses.positions[self._row[name]]), name), default=None
         )

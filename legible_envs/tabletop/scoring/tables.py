@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from legible_envs.errors import TaskError
 from legible_envs.observer import ObserverModel, PrefixSpec
+from legible_envs.subtasks import HUMAN
 from legible_envs.tabletop.scoring.exact_kernels import ReachTables
 from legible_envs.tasks import Stage, TaskGraph
 
@@ -53,7 +54,7 @@ def make_tables(task: TaskGraph, points: Sequence[str], observer: ObserverModel)
     if largest > MAX_GOALS:
         raise TaskError(f"at most {MAX_GOALS} goals may be candidates together, the task has {largest}")
     legs = _legs(task)
-    targets = sorted({*task.goals, *(end for _, end in legs)}, key=points.index)
+    targets = sorted({*task.goals_of(HUMAN), *(end for _, end in legs)}, key=points.index)
     reaches: dict[tuple[str, str], float] = defaultdict(float)
     for transition in task.transitions():
         reaches[transition.start, transition.goal] += transition.weight
@@ -105,7 +106,7 @@ def _stage_weights(groups: Sequence[tuple[str, list[str], list[Stage]]], num_poi
 def _legs(task: TaskGraph) -> dict[tuple[str, str], float]:
     """Expected legs, both directions of a path together; the second end is a goal wherever one is."""
     legs: dict[tuple[str, str], float] = defaultdict(float)
-    goals = set(task.goals)
+    goals = set(task.goals_of(HUMAN))
     for (a, b), weight in task.legs().items():
         key = (b, a) if (a in goals, b) > (b in goals, a) else (a, b)
         legs[key] += weight

@@ -360,6 +360,23 @@ def test_a_task_of_ones_own_lies_in_the_folder_and_counts_for_the_design(tables)
     assert len({before, own, load_study(tables).design_hash}) == 3
 
 
+def test_a_task_with_work_for_a_robot_alone_needs_the_robot(tables):
+    from legible_envs.tabletop.task import TabletopTask, read_task
+
+    plan = read_task("columns").to_dict()
+    for subtask in plan["task"]["subtasks"][:2]:
+        subtask["agents"] = ["robot"]
+    TabletopTask.from_dict(plan).to_yaml(tables / "own.yaml")
+    edit(tables, 'task = "columns"', 'task = "own.yaml"')
+    assert check_study(tables) == []
+    edit(tables, "reaches = 8 ", "reaches = 25 ")
+    assert not problem_with(tables, "cannot be made in 4 rounds with 6 objects each").is_error
+    study = (tables / "study.toml").read_text("utf-8")
+    start = study.index("[partner]")
+    (tables / "study.toml").write_text(study[:start] + study[study.index("\n[", start) + 1 :], "utf-8")
+    assert any("only a robot can perform, and there is none" in problem.message for problem in check_study(tables))
+
+
 def test_a_robot_is_for_tables_only(kitchens):
     edit(kitchens, "[rounds]", "[partner]\nthreshold = 0.9\n[rounds]")
     assert problem_with(kitchens, "in kitchens there is none").key == "partner"

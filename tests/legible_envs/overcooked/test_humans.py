@@ -161,7 +161,7 @@ def test_random_sequences_are_uniform():
         assert visits[stage.start, stage.goals] / 400 == pytest.approx(stage.weight, abs=error)
 
 
-@pytest.mark.parametrize("population", ["boltzmann", "planner"])
+@pytest.mark.parametrize("population", ["boltzmann", "planner", "cloned"])
 def test_participants_do_the_whole_task(population):
     layout = random_kitchen(np.random.default_rng(5), (7, 7))
     walks = simulate_participants(

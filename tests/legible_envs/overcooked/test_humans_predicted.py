@@ -52,7 +52,7 @@ def test_exact_score_equals_monte_carlo(prefix):
 # -- nothing leaks -----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("population", ["boltzmann", "planner"])
+@pytest.mark.parametrize("population", ["boltzmann", "planner", "cloned"])
 def test_one_cell_says_no_more_than_the_prior(population):
     rng = np.random.default_rng(0)
     for _ in range(3):

@@ -27,17 +27,17 @@ def test_kernels_run_as_plain_python():
     code = (
         "import numpy as np\n"
         "from legible_envs.overcooked import OvercookedWorkspace\n"
-        "from legible_envs.overcooked.humans import fit_rationality, simulate_participants\n"
+        "from legible_envs.overcooked.humans import fit_policy, fit_rationality, simulate_participants\n"
         "ws = OvercookedWorkspace((5, 5), human='boltzmann', rationality=1.1)\n"
         "genome = ws.sample(1, np.random.default_rng(0))[0]\n"
         "people = [simulate_participants(ws.decode(genome), 1, np.random.default_rng(0), population=name)\n"
-        "          for name in ('boltzmann', 'planner')]\n"
+        "          for name in ('boltzmann', 'planner', 'cloned')]\n"
         "print(ws.legibility(genome), *[walk.states.sum() for walks in people for walk in walks])\n"
         "print(*[round(float(walk.times[-1]), 6) for walks in people for walk in walks])\n"
-        "print(fit_rationality(people[0] + people[1]).interval)"
+        "print(fit_rationality(people[0] + people[1]).interval, fit_policy(people[2]).log_likelihood)"
     )
     numbers = [[float(word.strip("(),")) for word in text.split()] for text in printed_both_ways(code)]
-    assert len(numbers[0]) == 1 + 24 + 24 + 2
+    assert len(numbers[0]) == 1 + 36 + 36 + 3
     assert numbers[0] == pytest.approx(numbers[1], rel=1e-9)
 
 

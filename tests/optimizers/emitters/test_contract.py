@@ -1,5 +1,7 @@
 """What every emitter keeps, whatever it is: the contract, the seed, resuming, caps, an empty archive, its options."""
 
+from importlib.util import find_spec
+
 import numpy as np
 import pytest
 from ribs.emitters import EvolutionStrategyEmitter, GaussianEmitter
@@ -16,6 +18,7 @@ from optimizers import (
     ImproveWorkspaceEmitter,
     MutationEmitter,
     NoveltyLocalCompetitionEmitter,
+    PolicyGradientEmitter,
     RandomWorkspaceEmitter,
     check_emitter,
     list_emitters,
@@ -34,6 +37,7 @@ KITCHEN = OvercookedWorkspace(shape=(5, 5), prefix="sum")
 
 
 BUILT_IN = ["annealing", "cma-mae", "cma-me", "differential-evolution", "improve", "mutation", "nslc", "random"]
+BUILT_IN += ["ppo"] if find_spec("torch") else []
 ADAPTED = {
     "gaussian": (GaussianEmitter, {"sigma": 0.8, "batch_size": 32}),
     "evolution strategy": (EvolutionStrategyEmitter, {"sigma0": 1.0, "batch_size": 32}),
@@ -51,7 +55,7 @@ every_emitter = pytest.mark.parametrize(("emitter", "options"), EMITTERS.values(
 def test_all_that_are_built_in_are_here():
     built_in = {name: info for name, info in list_emitters().items() if info.origin == "built in"}
     # Needs a workspace with gradients; see the tests on the valley below and those of differentiable tables.
-    assert set(built_in) - {"gradient-arborescence"} == set(BUILT_IN)
+    assert set(built_in) - {"gradient-arborescence"} == {*BUILT_IN, "ppo"}
     assert all(info.summary().endswith(".") for info in built_in.values())
 
 
@@ -159,6 +163,13 @@ def test_an_option_it_does_not_have_is_refused_by_name(emitter, options):
         (NoveltyLocalCompetitionEmitter, {"neighbours": 0}),
         (NoveltyLocalCompetitionEmitter, {"crossover": 1.5}),
         (NoveltyLocalCompetitionEmitter, {"remember": -0.1}),
+        (PolicyGradientEmitter, {"designs": 0}),
+        (PolicyGradientEmitter, {"horizon": 0}),
+        (PolicyGradientEmitter, {"best": 0.0}),
+        (PolicyGradientEmitter, {"levels": 1}),
+        (PolicyGradientEmitter, {"learning_rate": 0.0}),
+        (PolicyGradientEmitter, {"discount": 1.5}),
+        (PolicyGradientEmitter, {"entropy": -1.0}),
         (RandomWorkspaceEmitter, {"batch_size": 0}),
     ],
     ids=lambda value: value.__name__ if callable(value) else next(iter(value)),
