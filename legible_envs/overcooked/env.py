@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any, Literal
 
@@ -21,12 +22,15 @@ from legible_envs.overcooked.game.view import GameView
 from legible_envs.overcooked.layout import OvercookedLayout
 from legible_envs.overcooked.layout_batches import layout_entries
 from legible_envs.overcooked.layouts import read_layout
+from legible_envs.overcooked.partner.interface import PARTNER
+from legible_envs.overcooked.partner.team import Game, Team, make_partner
 from legible_envs.overcooked.rendering.board import draw_small
 from legible_envs.overcooked.settings import NUM_ACTIONS, KitchenSettings, PackedKitchen, read_action, read_actions
 from legible_envs.overcooked.trajectories import trajectories_from_states
 from legible_envs.rollouts.trajectory import Trajectory
 from legible_envs.support.per_env import own_entry
 from legible_envs.support.specs import JsonSpec, check_options
+from legible_envs.support.validation import real
 
 __all__ = ["OvercookedEnv"]
 
@@ -103,6 +107,13 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
 
     With `obs_type="rgb"` a `Box` of `uint8` and shape `(12 H, 12 W, 3)`: the picture of `render`, smaller.
 
+    ## Partner
+
+    With `partner=` the kitchen has a second player, who decides for themselves. The environment has one agent as ever,
+    `Discrete(6)`, the person; its observations, goals and masks are those of player 0 of two. Person and partner act at
+    once, the partner on what it saw before. The robot waits until its predictor is sure of what the person fetches and
+    does something else that is needed; see `legible_envs.overcooked.partner.robot`. In measures a step counts as 0.15 s.
+
     ## Rewards
 
     +20 for every delivery. A crossing of a soft virtual obstacle costs `crossing_cost`. With `shaping=True`
@@ -139,6 +150,9 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
     | `num_done`    | int: subtasks done in this episode, here the deliveries |
     | `deliveries`  | int: soups delivered in this episode |
     | `crossings`   | int: steps onto soft virtual obstacles in this episode |
+    | `belief`      | with a partner: `(H, W)` float, the probability of each cell to be what the person fetches; zeros where there is no belief |
+    | `robot_target` | with a partner: int, `row * W + column` of the cell it goes for, -1 for none |
+    | `completion_time`, `human_idle`, `robot_idle`, `concurrent_activity`, `functional_delay`, `conflicts`, `goals_lost`, `decision_time`, `decision_fraction`, `decided`, `decided_rightly` | with a partner: floats, measures of the team so far, see `legible_envs.partner.fluency` and `legible_envs.overcooked.partner.team`; `inf` where not known yet |
 
     Names are told when asked for: `env.unwrapped.goals` names the valid goals in reading order (counters are
     `counter@(row,col)`), `env.unwrapped.goal_names[info["goal_mask"]]` does the same from the mask, and
@@ -176,6 +190,14 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
         crossing_cost: What a crossing of a soft virtual obstacle costs.
         shaping: False, True, or a mapping of rewards; see Rewards.
         num_players: Cooks, 1 to 4, all of whom this environment controls. `parallel_env` deals them out to agents.
+        partner: A second player beside the agent: `"robot"`, `"scripted"`, `"boltzmann"`, `"planner"`, a mapping of
+            arguments of one of them (`"kind"` says of which), `{"kind": "recorded", "actions": [...]}`,
+            `"module:Class"`, an object with the methods `reset` and `step`, or a policy to call with
+            `(observation, info)`; see Partner.
+        predictor: Of `partner="robot"`: predicts what the person fetches. None or `"bayesian"`, the built-in Bayesian
+            goal inference (Eq. 1); a name that `predictors.list_predictors()` lists; `"module:Class"`; or a predictor.
+            One that must be fitted and is not learns from simulated participants in this very kitchen.
+        threshold: Of `partner="robot"`: probability that a goal must exceed for it to be sure; at 1 it never predicts.
         rules: `"legible"`, or `"overcooked-ai-2019"`: the game of the recordings of 2019, in which one recipe is cooked
             again and again.
         render_mode: None, `"human"` (a window), `"rgb_array"` or `"ansi"`.
@@ -183,7 +205,9 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
     Raises:
         LayoutError: A kitchen that cannot be read, has another shape, or in which the recipes cannot be cooked; the
             message names row, column and rule.
-        ValueError: Any other bad argument, options of `reset` or actions.
+        ValueError: Any other bad argument, options of `reset` or actions; at `reset`, a predictor given by name that
+            cannot be fitted in this kitchen.
+        TypeError: A partner or predictor that lacks the methods.
         ResetNeeded: `step` before the first `reset`.
 
     ## Version History
@@ -207,6 +231,9 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
         crossing_cost: float = 0.0,
         shaping: bool | Mapping[str, float] = False,
         num_players: int = 1,
+        partner: Any = None,
+        predictor: Any = None,
+        threshold: float = 0.8,
         rules: str = "legible",
         render_mode: str | None = None,
     ) -> None:
@@ -222,13 +249,19 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
             crossing_cost=crossing_cost,
             shaping=shaping,
             num_players=num_players,
+            has_partner=partner is not None,
             rules=rules,
         )
+        threshold = real("threshold", threshold, 0, 1)
+        if partner is None and predictor is not None:
+            raise ValueError("`predictor` is for partner='robot'; there is no partner")
+        self._team = None if partner is None else Team(make_partner(partner, predictor, threshold))
         self.action_space = self.settings.action_space()
         self.observation_space = self.settings.observation_space()
         self._chosen: OvercookedLayout | None = None
         self._pending: PackedKitchen | None = None
         self._players = players = self.settings.num_players
+        self._agents = self.settings.num_agents
         self._actions = np.zeros(players, dtype=np.int64)
         self._goals = np.zeros((players, self.settings.shape[0] * self.settings.shape[1]), dtype=np.bool_)
         self._log = bytearray()
@@ -268,6 +301,9 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
         masks = np.empty((self._players, NUM_ACTIONS), dtype=np.int8)
         batch.begin(self._state, self._kitchen, self._rules, self._goals, masks)
         self._log.clear()
+        self._masks = masks
+        if self._team is not None:
+            self._team.begin(self._game(), self.settings.rules, self.np_random)
         self._begun = True
         if self.render_mode == "human":
             self.render()
@@ -288,7 +324,10 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
         """
         if not self._begun:
             raise ResetNeeded("Cannot call env.step() before calling env.reset()")
-        return self.play([read_action(action)] if self._players == 1 else read_actions(action, self._players))
+        moves = [read_action(action)] if self._agents == 1 else read_actions(action, self._players)
+        if self._team is not None:
+            moves.append(self._team.action)
+        return self.play(moves)
 
     def play(self, moves: list[int]) -> tuple[npt.NDArray[Any], float, bool, bool, dict[str, Any]]:
         """As :meth:`step` after the first reset, without looking at the actions again.
@@ -302,6 +341,9 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
         reward, over, _ = batch.play(
             self._state, self._kitchen, self._rules, self.settings.weights, self._actions, self._goals, masks
         )
+        self._masks = masks
+        if self._team is not None:
+            self._team.follow(self._game(), int(self._actions[0]), is_over=over)
         if self.render_mode == "human":
             self.render()
         return self.observe(), reward, over, False, self._info(masks)
@@ -359,7 +401,7 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
     def observe(self) -> npt.NDArray[Any]:
         """The observation of this moment, made anew."""
         observations = self._observe_all()
-        return observations[0] if self._players == 1 else observations
+        return observations[0] if self._agents == 1 else observations
 
     def _observe_all(self) -> npt.NDArray[Any]:
         """What each player sees, one behind the other."""
@@ -375,22 +417,69 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
         return np.repeat(draw_small(self.view())[None], self._players, axis=0)
 
     def _info(self, masks: npt.NDArray[np.int8]) -> dict[str, Any]:
-        deliveries = self._state.item(DELIVERIES)
         goals = self._goals.reshape(self._players, *self.settings.shape).copy()
+        if self._agents > 1:
+            return {"goal_mask": goals, "action_mask": masks, **self._counts()}
+        team = {} if self._team is None else self._team.info(self._packed.layout)
+        return {"goal_mask": goals[0], "action_mask": masks[0].copy(), **self._counts(), **team}
+
+    def _counts(self) -> dict[str, Any]:
+        """The part of ``info`` that is the same for all players."""
+        deliveries = self._state.item(DELIVERIES)
         return {
-            "goal_mask": goals[0] if self._players == 1 else goals,
-            "action_mask": masks[0] if self._players == 1 else masks,
             "layout_id": self._layout_number,
             "num_done": deliveries,
             "deliveries": deliveries,
             "crossings": self._state.item(CROSSINGS),
         }
 
+    # -- the partner --------------------------------------------------------------------------------------------------
+
+    def _game(self) -> Game:
+        return Game(self._packed.layout, self._state, self._kitchen, self._rules, self._goals, self._look_as_partner)
+
+    def _look_as_partner(self) -> tuple[npt.NDArray[Any], dict[str, Any]]:
+        """The partner's own observation and info."""
+        goals = self._goals[PARTNER].reshape(self.settings.shape).copy()
+        return self._observe_all()[PARTNER].copy(), {
+            "goal_mask": goals,
+            "action_mask": self._masks[PARTNER].copy(),
+            **self._counts(),
+        }
+
+    @property
+    def team(self) -> Team | None:
+        """The partner, what it believes, and the measures of the team; to be read only. None without a partner."""
+        return self._team
+
+    @property
+    def belief(self) -> dict[str, float] | None:
+        """``{station: probability}`` of the person's present reach, as the partner has it; None where it has none."""
+        return None if self._team is None or self._team.belief is None else dict(self._team.belief)
+
+    @property
+    def robot_state(self) -> str | None:
+        """What the partner is doing, in its own word, such as ``"wait"``; None without one."""
+        return None if self._team is None else self._team.command.state
+
+    @property
+    def robot_target(self) -> str | None:
+        """Name of the station or counter that the partner goes for."""
+        return None if self._team is None else self._team.command.target
+
+    def team_measures(self) -> Mapping[str, float]:
+        """Measures of the team so far, by the names of :meth:`.TeamMetrics.summary`; none without a partner."""
+        return {} if self._team is None else self._team.summary()
+
     # -- questions to the game ---------------------------------------------------------------------------------------
 
     def view(self) -> GameView:
         """A snapshot of the game in words, for drawing."""
-        return make_view(self._packed.layout, self._state, self._rules, self.settings.rules)
+        view = make_view(self._packed.layout, self._state, self._rules, self.settings.rules)
+        if self._team is None or not self._team.has_robot:
+            return view
+        person, robot = view.players
+        return replace(view, players=(person, replace(robot, is_robot=True)))
 
     def arrays(self) -> tuple[Vector, Kitchen, Vector]:
         """The game's ``(state, kitchen, rules)`` as described in ``vectors``; not copies, to be read only."""
@@ -428,7 +517,7 @@ class OvercookedEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[Any], Any]):
             raise ResetNeeded("Cannot call env.action_masks() before calling env.reset()")
         masks = np.empty((1, self._players, NUM_ACTIONS), dtype=np.int8)
         batch.find_all_actions(self._state[None], self._kitchen[None], self._rules, masks)
-        return (masks[0, 0] if self._players == 1 else masks[0]).astype(np.bool_)
+        return (masks[0, 0] if self._agents == 1 else masks[0]).astype(np.bool_)
 
     def trajectories(
         self,

@@ -7,10 +7,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from legible_envs.overcooked.game.vectors import AT_PLAYERS, HEIGHT, INTERACT, SOFT, STAY, WIDTH, Kitchen, Vector
+from legible_envs.overcooked.game.players import MAX_PLAYERS
+from legible_envs.overcooked.game.vectors import (
+    AT_PLAYERS,
+    HEIGHT,
+    INTERACT,
+    NUM_PLAYERS,
+    SOFT,
+    STAY,
+    WIDTH,
+    Kitchen,
+    Vector,
+)
 from legible_envs.overcooked.grid_kernels import costs_to, neighbour, steps_from
 from legible_envs.overcooked.humans.kernels import GoalField, choose_action, choose_step, look_around
 from legible_envs.overcooked.layout import FLOOR, OBSTACLE
+from legible_envs.support.validation import integer
 
 if TYPE_CHECKING:
     from legible_envs.overcooked.humans.walker import Walker
@@ -27,10 +39,16 @@ class ScriptedPlayer:
     path leads to the goal (see ``avoid_obstacles``). Reads the game from the environment, so it plays with every
     ``obs_type``, under wrappers, and in vector environments.
 
+    In a game of several players it gives way: who cannot step on a cell because somebody else is there, or wants to be,
+    goes away from them for a few steps every other time, and who has no goal strolls about. Two who walk by shortest
+    paths would else block each other for ever.
+
     Args:
         env: An environment made by ``gymnasium.make("LegibleOvercooked-v0")``, or a vector environment of such.
         rng: Source of all randomness.
         avoid_obstacles: Whether to walk round soft virtual obstacles.
+        player: Which player of a game of several it is; the answer is this player's action alone.
+        gives_way: Whether to give way to other players.
 
     Example:
         >>> import gymnasium as gym, legible_envs, numpy as np
@@ -45,10 +63,20 @@ class ScriptedPlayer:
         3
     """
 
-    def __init__(self, env: Any, rng: np.random.Generator, *, avoid_obstacles: bool = True) -> None:
+    def __init__(
+        self,
+        env: Any,
+        rng: np.random.Generator,
+        *,
+        avoid_obstacles: bool = True,
+        player: int = 0,
+        gives_way: bool = True,
+    ) -> None:
         self.env = env
         self.rng = rng
         self.avoid_obstacles = avoid_obstacles
+        self.player = integer("player", player, 0, MAX_PLAYERS - 1)
+        self.gives_way = gives_way
         self.num_envs: int | None = getattr(env.unwrapped, "num_envs", None)
         count = self.num_envs or 1
         self._height = self._width = 1
@@ -56,6 +84,8 @@ class ScriptedPlayer:
         self._layout_ids = [-1] * count
         self._floors: list[tuple[Flags, Flags] | None] = [None] * count
         self._steps: list[npt.NDArray[np.int32] | None] = [None] * count
+        self._last: list[tuple[int, int]] = [(-1, STAY)] * count
+        self._retreat = [0] * count
 
     def __call__(self, obs: Any, info: dict[str, Any]) -> Any:
         """The next action, an integer; for a vector environment ``(N,)`` integers.
@@ -68,10 +98,22 @@ class ScriptedPlayer:
             ValueError: An info of kitchens of another shape.
         """
         if self.num_envs is None:
-            return self._act(0, self.env.unwrapped.arrays(), info["goal_mask"], info["action_mask"], info["layout_id"])
+            goals, actions = self._own(info["goal_mask"], 2), self._own(info["action_mask"], 1)
+            return self._act(0, self.env.unwrapped.arrays(), goals, actions, info["layout_id"])
         arrays = self.env.call("arrays")
         keys = ("goal_mask", "action_mask", "layout_id")
-        return np.array([self._act(i, arrays[i], *(info[key][i] for key in keys)) for i in range(self.num_envs)])
+        masks = [[info[key][i] for key in keys] for i in range(self.num_envs)]
+        return np.array(
+            [self._act(i, arrays[i], self._own(g, 2), self._own(a, 1), n) for i, (g, a, n) in enumerate(masks)]
+        )
+
+    def _own(self, mask: npt.NDArray[Any], dimensions: int) -> npt.NDArray[Any]:
+        """This player's mask, of one of several players or the only one."""
+        if np.ndim(mask) <= dimensions:
+            return mask
+        if self.player >= len(mask):
+            raise ValueError(f"`info` is of {len(mask)} players; there is no player {self.player}")
+        return mask[self.player]  # type: ignore[no-any-return]
 
     def goal(self, index: int = 0) -> tuple[int, int] | None:
         """``(row, col)`` of the goal that the player walks to in a game, None between goals."""
@@ -79,15 +121,16 @@ class ScriptedPlayer:
 
     def _has_goal(self, index: int, goal_mask: npt.NDArray[np.bool_], layout_id: int) -> bool:
         """Whether there is a goal to walk to; if the last one is no longer valid, another is drawn."""
+        if layout_id != self._layout_ids[index]:
+            self._layout_ids[index] = layout_id
+            self._floors[index] = None
+            self._goals[index] = -1
         marked = goal_mask.ravel()
-        if layout_id == self._layout_ids[index] and self._goals[index] >= 0 and marked[self._goals[index]]:
+        if self._goals[index] >= 0 and marked[self._goals[index]]:
             return True
         choices = np.flatnonzero(marked)
         if not len(choices):
             return False
-        if layout_id != self._layout_ids[index]:
-            self._layout_ids[index] = layout_id
-            self._floors[index] = None
         self._goals[index] = int(self.rng.choice(choices))
         self._forget_path(index)
         return True
@@ -109,17 +152,57 @@ class ScriptedPlayer:
             raise ValueError(
                 f"`info` is of another environment: its goal_mask has shape {np.shape(goal_mask)}, the kitchen {shape}"
             )
-        if not self._has_goal(index, goal_mask, layout_id):
+        if self.player >= int(arrays[2][NUM_PLAYERS]):
+            raise ValueError(f"there is no player {self.player} in a game of {int(arrays[2][NUM_PLAYERS])}")
+        has_goal = self._has_goal(index, goal_mask, layout_id)
+        action = -1
+        if int(arrays[2][NUM_PLAYERS]) > 1 and self.gives_way:
+            action = self._go_away(index, arrays, idle=not has_goal)
+        if action < 0 and not has_goal:
             return STAY
-        action = self._approach(index, arrays, bool(action_mask[INTERACT]))
+        if action < 0:
+            action = self._approach(index, arrays, bool(action_mask[INTERACT]))
         if action == INTERACT:
             self._goals[index] = -1
+        self._last[index] = self._place(arrays)[0], action
         return action
+
+    def _place(self, arrays: tuple[Vector, Kitchen, Vector]) -> tuple[int, int]:
+        """The cell this player stands on, and the facing."""
+        at = AT_PLAYERS + 3 * self.player
+        return int(arrays[0][at]), int(arrays[0][at + 1])
+
+    def _go_away(self, index: int, arrays: tuple[Vector, Kitchen, Vector], idle: bool) -> int:
+        """A step away from the other players, where one is due; else -1.
+
+        It is due every other time to a player who was kept from the last step. One who has no goal strolls about, so as
+        not to stand for good where somebody else has to be.
+        """
+        state, kitchen, rules = arrays
+        cell = self._place(arrays)[0]
+        floor = self._find_floors(index, kitchen, rules)[1]
+        others = np.delete(state[AT_PLAYERS : AT_PLAYERS + 3 * rules[NUM_PLAYERS] : 3].astype(np.int64), self.player)
+        beside = [int(neighbour(cell, direction, self._height, self._width)) for direction in range(4)]
+        before, action = self._last[index]
+        kept = before == cell and action < STAY and beside[action] >= 0 and bool(floor[beside[action]])
+        if self._retreat[index] == 0 and kept and self.rng.random() < 0.5:
+            self._retreat[index] = int(self.rng.integers(1, self._height + self._width))
+        strolls = idle and self._retreat[index] == 0 and self.rng.random() < 0.5
+        if self._retreat[index] == 0 and not strolls:
+            return -1
+        free = [d for d, after in enumerate(beside) if after >= 0 and floor[after] and after not in others]
+        if not strolls:
+            self._retreat[index] -= 1
+            away = np.empty(len(floor), dtype=np.int32)
+            steps_from(others, floor, self._height, self._width, away)
+            most = max((int(away[beside[d]]) for d in free), default=-1)
+            free = [d for d in free if away[beside[d]] == most]
+        return int(self.rng.choice(free)) if free else STAY
 
     def _approach(self, index: int, arrays: tuple[Vector, Kitchen, Vector], can_interact: bool) -> int:
         """The next action on the path to a game's goal; INTERACT uses it."""
-        state, kitchen, rules = arrays
-        cell, facing = int(state[AT_PLAYERS]), int(state[AT_PLAYERS + 1])
+        _, kitchen, rules = arrays
+        cell, facing = self._place(arrays)
         goal, steps = self._goals[index], self._steps[index]
         if steps is None or steps[cell] < 0:
             steps = self._steps[index] = self._find_steps(index, cell, kitchen, rules)
@@ -156,6 +239,8 @@ class WalkingPlayer(ScriptedPlayer):
         env: An environment made by ``gymnasium.make("LegibleOvercooked-v0")``, or a vector environment of such.
         walker: How the person walks.
         rng: Source of all randomness.
+        player: Which player of a game of several it is.
+        gives_way: Whether to give way to other players.
 
     Example:
         >>> import gymnasium as gym, legible_envs, numpy as np
@@ -171,8 +256,10 @@ class WalkingPlayer(ScriptedPlayer):
         3
     """
 
-    def __init__(self, env: Any, walker: Walker, rng: np.random.Generator) -> None:
-        super().__init__(env, rng)
+    def __init__(
+        self, env: Any, walker: Walker, rng: np.random.Generator, *, player: int = 0, gives_way: bool = True
+    ) -> None:
+        super().__init__(env, rng, player=player, gives_way=gives_way)
         self.walker = walker
         self._paths: list[_Path | None] = [None] * len(self._goals)
 
@@ -180,8 +267,8 @@ class WalkingPlayer(ScriptedPlayer):
         self._paths[index] = None
 
     def _approach(self, index: int, arrays: tuple[Vector, Kitchen, Vector], can_interact: bool) -> int:
-        state, kitchen, rules = arrays
-        cell, facing = int(state[AT_PLAYERS]), int(state[AT_PLAYERS + 1])
+        _, kitchen, rules = arrays
+        cell, facing = self._place(arrays)
         path = self._paths[index]
         if path is None or not path.leads_from(cell):
             floors = self._find_floors(index, kitchen, rules)

@@ -78,6 +78,7 @@ class KitchenSettings:
         crossing_cost: float = 0.0,
         shaping: bool | Mapping[str, float] = False,
         num_players: int = 1,
+        has_partner: bool = False,
         rules: str = "legible",
     ) -> None:
         asked = None if shape is None else check_shape(shape)
@@ -97,6 +98,14 @@ class KitchenSettings:
             soft_obstacles=virtual_obstacles == "soft",
         )
         self.num_players = integer("num_players", num_players, 1, MAX_PLAYERS, whole_floats=True)
+        if has_partner and self.num_players > 1:
+            raise ValueError(
+                f"with `partner` the agent is one of two players, so `num_players` must be 1, got {num_players}; or "
+                "leave `partner` out and control all players"
+            )
+        self.num_agents = self.num_players
+        """Players that an environment's actions and observations are of."""
+        self.num_players += has_partner
         bonus = switched_weights("shaping", shaping, SHAPING) or dict.fromkeys(SHAPING, 0.0)
         self.weights = np.array([DELIVERY_REWARD, bonus["ingredient"], bonus["dish"], bonus["soup"], -crossing_cost])
         self.distribution: LayoutDistribution | None = None
@@ -141,16 +150,16 @@ class KitchenSettings:
 
     def action_space(self) -> spaces.Discrete[Any] | spaces.MultiDiscrete[Any]:
         """The space of one environment's actions: those of all players."""
-        if self.num_players == 1:
+        if self.num_agents == 1:
             return self.player_action_space()
-        return spaces.MultiDiscrete([NUM_ACTIONS] * self.num_players)
+        return spaces.MultiDiscrete([NUM_ACTIONS] * self.num_agents)
 
     def observation_space(self) -> spaces.Box:
         """The space of one environment's observations: with several players one behind the other."""
         space = self.player_observation_space()
-        if self.num_players == 1:
+        if self.num_agents == 1:
             return space
-        low, high = (np.repeat(bound[None], self.num_players, axis=0) for bound in (space.low, space.high))
+        low, high = (np.repeat(bound[None], self.num_agents, axis=0) for bound in (space.low, space.high))
         return spaces.Box(low, high, dtype=space.dtype.type)  # type: ignore[union-attr]
 
     @staticmethod

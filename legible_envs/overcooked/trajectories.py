@@ -200,7 +200,7 @@ def trajectories_from_states(
         states[:, at + 2, None],
         np.arange(len(states)) * seconds_per_tick,
         participants=[participant],
-        starts=[_station_beside(layout, cells[0])],
+        starts=[station_beside(layout, cells[0])],
         valid_goals=None if goals is None else lambda tick, _: name_goals(layout, goals[tick]),
         min_positions=min_positions,
         min_candidates=min_candidates,
@@ -255,7 +255,7 @@ def trajectories_from_views(
         held,
         np.arange(len(views)) * seconds_per_tick,
         participants=[participant] if count == 1 else [f"{participant}/{n}" for n in range(count)],
-        starts=[_station_beside(layout, cell) for cell in cells[0]],
+        starts=[station_beside(layout, cell) for cell in cells[0]],
         valid_goals=None if valid_goals is None else lambda tick, _: valid_goals[tick],
         min_positions=min_positions,
         min_candidates=min_candidates,
@@ -264,5 +264,5 @@ def trajectories_from_views(
     )
 
 
-def _station_beside(layout: OvercookedLayout, cell: Sequence[int]) -> str | None:
+def station_beside(layout: OvercookedLayout, cell: Sequence[int]) -> str | None:
     return next((n for n in layout.named("serving") if (int(cell[0]), int(cell[1])) in layout.access(n)), None)

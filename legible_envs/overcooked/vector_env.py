@@ -102,6 +102,12 @@ class OvercookedVectorEnv(JsonSpec, Windowed, VectorEnv[npt.NDArray[Any], npt.ND
         self.metadata = {**OvercookedEnv.metadata, "autoreset_mode": self.autoreset_mode}
         self._set_render_mode(render_mode)
         self.num_envs = integer("num_envs", num_envs, 1, MOST_GAMES, whole_floats=True)
+        for name in ("partner", "predictor", "threshold"):
+            if kwargs.pop(name, None) is not None:
+                raise ValueError(
+                    f"the batched kitchen knows no `{name}`: partners decide one by one; make the vector with "
+                    'vectorization_mode="sync" (or "async")'
+                )
         self.settings = KitchenSettings(**kwargs)
         self.max_episode_steps = read_step_limit(max_episode_steps)
         self.num_players = self.settings.num_players

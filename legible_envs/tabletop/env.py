@@ -162,7 +162,7 @@ class TabletopEnv(JsonSpec, Rendered, gym.Env[npt.NDArray[np.float32], npt.NDArr
     | `layout_id`     | int: identifies the layout; the number that the twelve hexadecimal digits of `layout.layout_id` write, `int(layout.layout_id, 16)` |
     | `belief`        | with a predictor or partner: `(n,)` float, the probability of each object to be the goal of the present reach; zeros where there is no belief |
     | `robot_target`  | with a partner: int, index of the object it goes for or carries, -1 for none |
-    | `completion_time`, `human_idle`, `robot_idle`, `concurrent_activity`, `functional_delay`, `conflicts`, `goals_lost`, `decision_time`, `decision_fraction`, `decided`, `decided_rightly` | with a partner: floats, measures of the team so far, see `legible_envs.tabletop.partner.fluency`; `inf` where not known yet |
+    | `completion_time`, `human_idle`, `robot_idle`, `concurrent_activity`, `functional_delay`, `conflicts`, `goals_lost`, `decision_time`, `decision_fraction`, `decided`, `decided_rightly` | with a partner: floats, measures of the team so far, see `legible_envs.partner.fluency`; `inf` where not known yet |
 
     Names are told when asked for: `env.unwrapped.goals` names the valid goals, `goal_names` all objects, so that
     `env.unwrapped.goal_names[info["goal_mask"]]` names the valid ones from the mask; `start`, `holding`,

@@ -36,6 +36,8 @@ ALLOWED = {
     (OvercookedEnv, "layouts"): {"none"},
     (OvercookedEnv, "shaping"): {"bool"},
     (TabletopEnv, "shaping"): {"bool"},
+    (OvercookedEnv, "partner"): {"none"},
+    (OvercookedEnv, "predictor"): {"none"},
     (OvercookedEnv, "render_mode"): {"none"},
     (OvercookedVectorEnv, "max_episode_steps"): {"none"},
     (OvercookedVectorEnv, "render_mode"): {"none"},
@@ -75,7 +77,7 @@ CONTENTS = {
 }
 """Descriptions of a layout, task or predictor that have the right type: the error says what is wrong in them."""
 
-TYPES = {(TabletopEnv, "partner"), (TabletopEnv, "predictor")}
+TYPES = {(OvercookedEnv, "partner"), (TabletopEnv, "partner"), (TabletopEnv, "predictor")}
 """Objects without the methods are a TypeError, as documented."""
 
 CONSTRUCTORS = (

@@ -9,6 +9,7 @@ from benchmarks.csv_tables import write_tables
 from benchmarks.experiments.conditions import stacked
 from benchmarks.experiments.overcooked import figures, narrative, tables
 from benchmarks.experiments.overcooked.sweep import FITTED
+from benchmarks.experiments.overcooked.teams import about_teams, load_teams, team_table, wide_table
 from benchmarks.reports.experiment_report import Section
 from benchmarks.reports.narrative import narrate
 
@@ -57,6 +58,9 @@ def sections(folder: str | Path) -> list[Section]:
         "hypotheses_by_fraction": points,
         "verdicts": verdicts,
     }
+    teams = load_teams(folder)
+    if teams is not None:
+        written["teams"] = team_table(teams)
     write_tables(folder / "tables", written.items())
     drawn = figures.draw_all(results, folder / "figures")
     return [
@@ -89,7 +93,14 @@ def sections(folder: str | Path) -> list[Section]:
             drawn["confusion"],
             _CAPTIONS,
         ),
+        *([] if teams is None else [_about_teams(teams)]),
     ]
+
+
+def _about_teams(teams: pd.DataFrame) -> Section:
+    table = team_table(teams)
+    found = {"Means over kitchens": wide_table(table), "With 95 % intervals": table}
+    return Section("With a robot", about_teams(teams, table), found)
 
 
 # -- tables for the page ----------------------------------------------------------------------------------------------

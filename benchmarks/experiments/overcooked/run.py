@@ -19,6 +19,7 @@ from benchmarks.experiments.overcooked.sweep import (
     layout_trials,
     people_of,
 )
+from benchmarks.experiments.overcooked.teams import play_with_robot, team_trials
 from benchmarks.experiments.predictor_settings import predictor_from
 from benchmarks.experiments.running import Rows, RunOptions, log_trials, with_layouts
 from benchmarks.experiments.trial_rows import accuracy_rows, curve_rows
@@ -46,12 +47,12 @@ def reproduce(
     """Run the trials that have no result yet, and write result files; ``sections`` makes tables and figures of them.
 
     Args:
-        folder: Folder of the experiment. ``layouts.csv``, ``people.csv``, ``readings.csv`` and ``curves.csv`` hold the
-            results.
+        folder: Folder of the experiment. ``layouts.csv``, ``people.csv``, ``readings.csv``, ``curves.csv`` and
+            ``teams.csv`` hold the results.
         quick: Fewer layouts, participants and searches.
         seeds: Layouts per condition, each searched anew; None for those of the settings.
         settings: In place of the full or quick ones.
-        how: ``workers``, ``scheduler`` and ``progress`` of :func:`benchmarks.trials.run_trials`, for each of the four
+        how: ``workers``, ``scheduler`` and ``progress`` of :func:`benchmarks.trials.run_trials`, for each of the five
             parts in turn.
 
     Raises:
@@ -68,6 +69,7 @@ def reproduce(
     places: Rows = layouts[layouts["table"] == "layout"].to_dict("records")  # type: ignore[assignment]
     log("readings", evaluate_predictor, accuracy_trials(settings, places, people), "people")
     log("curves", trace_learning_curve, curve_trials(settings, places, people), "people")
+    log("teams", play_with_robot, team_trials(settings, places, people), "people")
 
 
 def _num_recorded() -> int:

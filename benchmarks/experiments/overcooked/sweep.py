@@ -96,6 +96,7 @@ class Settings:
         curve_repeats: Splits of the learning curves.
         shape: Rows and columns of the kitchens.
         seed: Of the participants and splits.
+        team_participants: Simulated participants per layout and kind of walker who cook with each robot.
     """
 
     layouts: int = 5
@@ -109,6 +110,7 @@ class Settings:
     curve_repeats: int = 4
     shape: tuple[int, int] = (7, 7)
     seed: int = 0
+    team_participants: int = 8
 
 
 FULL: Final = Settings()
@@ -121,6 +123,7 @@ QUICK: Final = Settings(
     repeats=1,
     shares=(0.3, 1.0),
     curve_repeats=2,
+    team_participants=2,
 )
 
 

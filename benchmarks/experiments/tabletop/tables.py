@@ -49,7 +49,7 @@ MEASURES: Final = (
     "decision_fraction",
     "decided_rightly",
 )
-"""What is told of teams, as :meth:`~legible_envs.tabletop.partner.fluency.TeamMetrics.summary` names it."""
+"""What is told of teams, as :meth:`~legible_envs.partner.fluency.TeamMetrics.summary` names it."""
 TESTS: Final = {"Placement": ["Baseline"], "Virtual Obstacle": ["Baseline"], "Both": list(CONDITIONS[1:-1])}
 """Designs, and the conditions than which their goals should be predicted better."""
 SHARE: Final = 0.3

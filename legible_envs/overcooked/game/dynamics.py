@@ -233,7 +233,8 @@ def interaction(state: Vector, kitchen: Kitchen, rules: Vector, player: int) -> 
 
 
 @kernel
-def _add_to_pot(state: Vector, rules: Vector, pot: int, item: int) -> None:
+def add_to_pot(state: Vector, rules: Vector, pot: int, item: int) -> None:
+    """Put an ingredient into the pot whose record starts at ``pot``; a soup that is complete starts."""
     state[pot + item] += 1
     order = _complete(state, rules, pot)
     if order >= 0:
@@ -274,7 +275,7 @@ def interact(state: Vector, kitchen: Kitchen, rules: Vector, player: int) -> int
         state[at + 2] = state[rules[AT_ITEMS] + target]
         state[rules[AT_ITEMS] + target] = held
     elif what == ADDS:
-        _add_to_pot(state, rules, pot_at(state, rules, target), held)
+        add_to_pot(state, rules, pot_at(state, rules, target), held)
         state[at + 2] = 0
     elif what == SCOOPS:
         state[at + 2] = _scoop(state, rules, pot_at(state, rules, target))

@@ -27,11 +27,19 @@ class Item:
 
 @dataclass(frozen=True, slots=True)
 class PlayerView:
-    """One player: the cell stood on, the facing as an action (0 N, 1 S, 2 E, 3 W), and the item held."""
+    """One player.
+
+    Attributes:
+        cell: The cell stood on.
+        facing: As an action: 0 N, 1 S, 2 E, 3 W.
+        held: The item held.
+        is_robot: Whether it is a robot.
+    """
 
     cell: Cell
     facing: int
     held: Item | None = None
+    is_robot: bool = False
 
 
 @dataclass(frozen=True, slots=True)

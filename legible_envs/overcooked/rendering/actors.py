@@ -12,6 +12,7 @@ from legible_envs.overcooked.game.view import Item, PotView
 from legible_envs.overcooked.grid import EAST, NORTH, SOUTH, WEST
 from legible_envs.overcooked.rendering.food import draw_item, draw_pieces, soup_colour
 from legible_envs.overcooked.rendering.palette import PALETTE, PLAYER_COLOURS
+from legible_envs.overcooked.rendering.robots import draw_robot
 from legible_envs.overcooked.rendering.tiles import COUNTER_TOP
 
 __all__ = [
@@ -123,8 +124,8 @@ def draw_chef(canvas: Pen, colour: str, facing: int) -> None:
     _head(canvas, colour, facing)
 
 
-def draw_hands(canvas: Pen, facing: int, full: bool) -> None:
-    """A chef's hands, empty or round what they hold."""
+def draw_hands(canvas: Pen, facing: int, full: bool, skin: str = PALETTE["skin"]) -> None:
+    """A chef's or robot's hands, empty or round what they hold."""
     x, y = held_at(facing)
     if full:
         hands = [(x - 0.19, y + 0.06), (x + 0.19, y + 0.06)]
@@ -133,8 +134,8 @@ def draw_hands(canvas: Pen, facing: int, full: bool) -> None:
     else:
         hands = [(x - (0.5 - x) * 0.12, 0.94)]
     for hand in hands:
-        canvas.circle(*hand, 0.066, mix(PALETTE["skin"], "#7a3f1c", 0.4))
-        canvas.circle(*hand, 0.053, PALETTE["skin"])
+        canvas.circle(*hand, 0.066, mix(skin, "#7a3f1c", 0.4))
+        canvas.circle(*hand, 0.053, skin)
 
 
 def draw_wedge(canvas: Pen, colour: str, facing: int) -> None:
@@ -149,27 +150,29 @@ def draw_wedge(canvas: Pen, colour: str, facing: int) -> None:
 
 
 @lru_cache(maxsize=512)
-def chef_sprite(player: int, facing: int, held: Item | None, size: int) -> Sprite:
-    """A chef, one tile wide and ``1 + CHEF_RISE`` tall; the cell stood on is the lower part.
+def chef_sprite(player: int, facing: int, held: Item | None, size: int, is_robot: bool = False) -> Sprite:
+    """A chef or a robot, one tile wide and ``1 + CHEF_RISE`` tall; the cell stood on is the lower part.
 
     Args:
         player: Index of the player, which sets the colour of scarf and apron.
         facing: 0 N, 1 S, 2 E, 3 W.
         held: What is in the hands.
         size: Pixels of a tile.
+        is_robot: Whether it is a robot.
     """
     if facing not in (NORTH, SOUTH, EAST, WEST):
         raise ValueError(f"facing must be 0 N, 1 S, 2 E or 3 W, got {facing!r}")
     colour = PLAYER_COLOURS[player % len(PLAYER_COLOURS)]
     canvas = Canvas(size, tall=1 + CHEF_RISE)
     draw_wedge(canvas, colour, facing)
+    draw_body = draw_robot if is_robot else draw_chef
     if facing != NORTH:
-        draw_chef(canvas, colour, facing)
+        draw_body(canvas, colour, facing)
     if held is not None:
         draw_item(canvas, held, *held_at(facing), held_radius(held.kind))
-    draw_hands(canvas, facing, held is not None)
+    draw_hands(canvas, facing, held is not None, PALETTE["steel_dark" if is_robot else "skin"])
     if facing == NORTH:
-        draw_chef(canvas, colour, facing)
+        draw_body(canvas, colour, facing)
     return canvas.sprite()
 
 

@@ -92,7 +92,7 @@ def draw_game(view: GameView, *, tile: int = 48, hud: bool = True) -> Image:
         paste(board, item_sprite(item, tile), row * tile, col * tile)
     for player in sorted(range(len(view.players)), key=lambda p: view.players[p].cell):  # nearer ones in front
         seen = view.players[player]
-        sprite = chef_sprite(player, seen.facing, seen.held, tile)
+        sprite = chef_sprite(player, seen.facing, seen.held, tile, seen.is_robot)
         row, col = seen.cell
         paste(board, sprite, (row + 1) * tile - len(sprite.colour), col * tile)
     if hud:

@@ -1,21 +1,16 @@
-"""Observing a person's intent through any predictor; a predictor that fails does not stop the episode."""
+"""Observing the intent of a person at the table through any predictor."""
 
 from __future__ import annotations
 
-import copy
 import math
-import warnings
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from legible_envs.partner.intent import Predictor, ReachObserver, predictor_registry, read_predictor
 from legible_envs.rollouts.trajectory import Trajectory
-from legible_envs.support.plugins import Registry
-from legible_envs.support.validation import shown
 from legible_envs.tabletop.partner.belief import BayesianIntent
-from legible_envs.tabletop.partner.interface import Floats, GoalStream, PrefixPredictor, Senses, StreamingPredictor
+from legible_envs.tabletop.partner.interface import Senses
 
 if TYPE_CHECKING:
     from legible_envs.tabletop.layout import TabletopLayout
@@ -23,18 +18,9 @@ if TYPE_CHECKING:
 
 __all__ = ["IntentObserver", "Predictor", "make_intent_predictor"]
 
-Predictor = StreamingPredictor | PrefixPredictor
-"""A predictor that an :class:`IntentObserver` can follow a reach with."""
-
-_SUM_TOLERANCE: Final = 1e-6
 _PARTICIPANTS: Final = 3
 
-_registry = Registry(
-    "predictor",
-    "legible.predictors",
-    {"bayesian": "legible_envs.tabletop.partner.belief:BayesianIntent"},
-    ValueError,
-)
+_registry = predictor_registry("legible_envs.tabletop.partner.belief:BayesianIntent")
 
 
 def make_intent_predictor(spec: object = None) -> Predictor:
@@ -52,53 +38,20 @@ def make_intent_predictor(spec: object = None) -> Predictor:
         ValueError: It cannot be imported or made.
         TypeError: It is no predictor.
     """
-    if spec is None:
-        return BayesianIntent()
-    predictor = spec
-    if isinstance(spec, str):
-        factory = _registry.resolve(spec)
-        try:
-            predictor = factory()
-        except Exception as error:
-            raise ValueError(f"predictor {spec!r} cannot be made without arguments: {error}") from error
-    methods = ("stream", "predict_proba")
-    if isinstance(predictor, type) or not any(callable(getattr(predictor, method, None)) for method in methods):
-        raise TypeError(
-            "a `predictor` must be an object with a method `stream` or `predict_proba`, a name, 'module:Class' or "
-            f"None, got {shown(spec)}"
-        )
-    return predictor  # type: ignore[return-value]  # has one of the methods
+    return read_predictor(spec, _registry, BayesianIntent)
 
 
-class IntentObserver:
-    """Follows the reaches of a person with a predictor, which says how probable each goal is.
-
-    The predictor sees each reach from its beginning, in the order in which it happened and nothing of the future. Where
-    the valid goals change during a reach, the predictor sees this reach again with the new ones. An exception, or an
-    answer other than finite probabilities of the valid goals that sum to one, is reported once by a ``RuntimeWarning``;
-    there is no belief then until the next reach.
-
-    A predictor that must be fitted and is not (it has ``fit`` but no ``classes_``) is fitted, in a copy, on simulated
-    participants who build the task on this very table, always the same ones; and anew on each other table. To use
-    one that has learned from other trajectories, pass the fitted instance.
+class IntentObserver(ReachObserver):
+    """Follows the reaches of a person at the table; see :class:`~legible_envs.partner.intent.ReachObserver`.
 
     Args:
         predictor: A predictor in any form that :func:`make_intent_predictor` takes.
-
-    Attributes:
-        name: Name of the predictor in messages.
-        failure: The first error of the predictor, or None.
     """
 
+    place = "at this table"
+
     def __init__(self, predictor: object = None) -> None:
-        self._given = make_intent_predictor(predictor)
-        self._is_named = isinstance(predictor, str)
-        self.name = predictor if isinstance(predictor, str) else type(self._given).__name__
-        self.failure: str | None = None
-        self._predictor: Predictor | None = None
-        self._fitted_on: tuple[TabletopLayout, TabletopTask] | None = None
-        self._layout: TabletopLayout | None = None
-        self._reach: _Reach | None = None
+        super().__init__(make_intent_predictor(predictor), predictor if isinstance(predictor, str) else None)
 
     def reset(self, layout: TabletopLayout, task: TabletopTask) -> None:
         """Begin an episode on a table.
@@ -107,157 +60,31 @@ class IntentObserver:
             ValueError: A predictor that was given by name must be fitted, and cannot be fitted on simulated
                 participants at this table. (An instance that cannot be fitted is reported by a ``RuntimeWarning``.)
         """
-        self._layout = layout
-        self._reach = None
-        if not hasattr(self._given, "fit") or hasattr(self._given, "classes_"):
-            self._predictor = self._given
-        elif self._fitted_on != (layout, task):
-            self._predictor, self._fitted_on = None, (layout, task)
-            try:
-                fitted: Any = copy.deepcopy(self._given)
-                fitted.fit(_simulated_reaches(layout, task))
-            except Exception as error:
-                self._refuse_unfitted(error)
-            else:
-                self._predictor = fitted
+        self._layout, self._task = layout, task
+        self._begin((layout, task))
 
-    def _refuse_unfitted(self, error: Exception) -> None:
-        kind = type(self._given).__name__
-        reason = ValueError(
-            f"predictor {self.name} must be fitted, and fitting it on simulated participants at this table failed "
-            f"({type(error).__name__}: {error}); pass a fitted instance, such as predictor={kind}().fit(trajectories)"
-        )
-        if self._is_named:
-            self._fitted_on = None
-            raise reason from error
-        self._report(reason)
-
-    def observe(self, senses: Senses) -> dict[str, float] | None:
-        """``{goal: probability}`` now; None where there is no reach, no valid goal, or the predictor failed."""
-        if not len(senses.reach) or not senses.goals or self._predictor is None or self._layout is None:
-            return None
-        occasion = _Occasion(senses.reach_number, frozenset(senses.goals))
-        if self._reach is None or self._reach.occasion != occasion:
-            self._reach = _Reach(occasion)
-        if self._reach.failed:
-            return None
-        try:
-            if self._reach.stream is None:
-                self._reach.stream = _open_stream(self._predictor, _context(senses, self._layout))
-            belief = self._reach.show(senses)
-            return _checked_belief(belief, senses.goals)
-        except Exception as error:
-            self._reach.failed = True
-            self._report(error)
-            return None
-
-    def _report(self, error: Exception) -> None:
-        if self.failure is None:
-            self.failure = f"{type(error).__name__}: {error}"
-            warnings.warn(
-                f"predictor {self.name} failed, so the robot waits; later failures are not reported: {self.failure}",
-                RuntimeWarning,
-                stacklevel=2,
-            )
-
-
-class _Occasion(NamedTuple):
-    """A reach and the goals that were valid."""
-
-    reach_number: int
-    goals: frozenset[str]
-
-
-@dataclass
-class _Reach:
-    """One reach with one set of valid goals, as far as the predictor saw it."""
-
-    occasion: _Occasion
-    stream: GoalStream | None = None
-    belief: object = None
-    seen: int = 0
-    failed: bool = False
-
-    def show(self, senses: Senses) -> object:
-        """Show the predictor the points it has not seen yet; the belief after the last."""
-        assert self.stream is not None
-        # A copy, since a predictor may keep what it is shown.
-        states, times = senses.reach[self.seen :].copy(), senses.times[self.seen :].tolist()
-        # A stream may have `add`, which takes a point without the cost of a belief that is not asked for.
-        add = getattr(self.stream, "add", self.stream.update)
-        for point, time in zip(states[:-1], times[:-1], strict=True):
-            add(point, time)
-        if len(states):
-            self.belief = self.stream.update(states[-1], times[-1])
-        self.seen = len(senses.reach)
-        return self.belief
-
-
-class _PrefixStream:
-    """A stream for predictors that only have ``predict_proba``."""
-
-    def __init__(self, predictor: PrefixPredictor, context: Trajectory) -> None:
-        self._predictor = predictor
-        self._context = context
-        self._points: list[Floats] = []
-        self._times: list[float] = []
-
-    def add(self, point: Floats, time: float) -> None:
-        self._points.append(point)
-        self._times.append(time)
-
-    def update(self, point: Floats, time: float) -> dict[str, float]:
-        self.add(point, time)
-        known = self._context
-        prefix = Trajectory(
-            np.array(self._points),
-            np.array(self._times),
-            start=known.start,
-            candidates=known.candidates,
-            layout=known.layout,
-            candidate_set=known.candidate_set,
+    def _context(self, senses: Senses) -> Trajectory:
+        starts = self._layout.table.starts
+        nearest = min(starts, key=lambda name: math.dist(starts[name], senses.start))
+        rows = [self._layout.index(goal) for goal in senses.goals]
+        return Trajectory(
+            np.zeros((0, 2)),
+            start=nearest,
+            candidates=senses.goals,
+            layout=self._layout,
+            candidate_set="game",
             complete=False,
-            goal_positions=known.goal_positions,
+            goal_positions=tuple(map(tuple, senses.positions[rows].tolist())),
         )
-        row = dict(zip(self._predictor.classes_, self._predictor.predict_proba([prefix])[0], strict=True))
-        return {goal: float(row[goal]) for goal in known.candidates}
 
+    def _simulate(self) -> list[Trajectory]:
+        """Reaches of a few simulated participants who build the task."""
+        from legible_envs.tabletop.humans.simulation import sample_person, simulate_task
 
-def _open_stream(predictor: Predictor, context: Trajectory) -> GoalStream:
-    # Not by isinstance: a protocol's check at run time takes several times as long.
-    if hasattr(predictor, "stream"):
-        return predictor.stream(context)
-    return _PrefixStream(predictor, context)
-
-
-def _context(senses: Senses, layout: TabletopLayout) -> Trajectory:
-    """The facts of a reach that are known before its first point."""
-    starts = layout.table.starts
-    nearest = min(starts, key=lambda name: math.dist(starts[name], senses.start))
-    rows = [layout.index(goal) for goal in senses.goals]
-    return Trajectory(
-        np.zeros((0, 2)),
-        start=nearest,
-        candidates=senses.goals,
-        layout=layout,
-        candidate_set="game",
-        complete=False,
-        goal_positions=tuple(map(tuple, senses.positions[rows].tolist())),
-    )
-
-
-def _checked_belief(belief: object, goals: tuple[str, ...]) -> dict[str, float]:
-    if not isinstance(belief, Mapping) or set(belief) != set(goals):
-        raise ValueError(f"expected probabilities of {sorted(goals)}, got {belief!r}")
-    values = [float(p) for p in belief.values()]
-    if not all(0 <= p < math.inf for p in values) or abs(math.fsum(values) - 1) > _SUM_TOLERANCE:
-        raise ValueError(f"expected probabilities that sum to one, got {dict(belief)!r}")
-    return {goal: float(belief[goal]) for goal in goals}
-
-
-def _simulated_reaches(layout: TabletopLayout, task: TabletopTask) -> list[Trajectory]:
-    """Reaches of a few simulated participants who build the task."""
-    from legible_envs.tabletop.humans.simulation import sample_person, simulate_task
-
-    rng = np.random.default_rng(0)
-    return [reach for _ in range(_PARTICIPANTS) for reach in simulate_task(layout, sample_person(rng), rng, task=task)]
+        rng = np.random.default_rng(0)
+        # Drawn one by one between their reaches, as ever: the same participants, and the same fit.
+        return [
+            reach
+            for _ in range(_PARTICIPANTS)
+            for reach in simulate_task(self._layout, sample_person(rng), rng, task=self._task)
+        ]

@@ -1,32 +1,22 @@
-"""The inputs and answers of partners and predictors: any object with these methods can take part."""
+"""The inputs and answers of partners: any object with these methods can take part."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
+from legible_envs.partner.interface import Floats
+
 if TYPE_CHECKING:
-    from legible_envs.rollouts.trajectory import Trajectory
     from legible_envs.tabletop.layout import TabletopLayout
     from legible_envs.tabletop.task import TabletopTask
 
-__all__ = [
-    "Command",
-    "Floats",
-    "GoalStream",
-    "Partner",
-    "PrefixPredictor",
-    "Senses",
-    "State",
-    "StreamingPredictor",
-    "gripper_home",
-]
+__all__ = ["Command", "Partner", "Senses", "State", "gripper_home"]
 
-Floats = npt.NDArray[np.float64]
 State = Literal["wait", "approach", "grasp", "carry", "place"]
 
 
@@ -110,29 +100,3 @@ def gripper_home(layout: TabletopLayout) -> tuple[float, float]:
     """Where a gripper begins unless a robot says otherwise: the middle of the table's far side, 5 cm from the edge."""
     width, depth = layout.table.size
     return width / 2, depth - 0.05
-
-
-class GoalStream(Protocol):
-    """The belief about one reach while it happens."""
-
-    def update(self, point: Floats, time: float) -> Mapping[str, float]:
-        """Move the hand to ``(2,)`` at a time in seconds; ``{goal: probability}``."""
-        ...
-
-
-class StreamingPredictor(Protocol):
-    """A predictor that follows a reach point by point."""
-
-    def stream(self, context: Trajectory) -> GoalStream:
-        """Open a stream for one reach; ``context`` has its layout, candidates and their places, and no states."""
-        ...
-
-
-class PrefixPredictor(Protocol):
-    """A predictor of observed parts of trajectories."""
-
-    classes_: Sequence[str]
-
-    def predict_proba(self, X: Sequence[Trajectory]) -> Floats:
-        """``(len(X), len(classes_))`` probabilities."""
-        ...

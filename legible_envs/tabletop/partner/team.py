@@ -10,35 +10,21 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from legible_envs.partner.fluency import TeamMetrics, known_measures, tick_of
 from legible_envs.support.plugins import import_target
 from legible_envs.support.validation import shown
 from legible_envs.tabletop.game.game import DT, RATE, TableGame
-from legible_envs.tabletop.partner.fluency import TeamMetrics, tick_of
 from legible_envs.tabletop.partner.intent import IntentObserver
 from legible_envs.tabletop.partner.interface import Command, Partner, Senses, gripper_home
 from legible_envs.tabletop.partner.robot import RobotPartner
 
-__all__ = ["GRIPPER_SPEED", "MEASURES", "Team", "make_partner"]
+__all__ = ["GRIPPER_SPEED", "Team", "make_partner"]
 
 GRIPPER_SPEED: Final = 1.0
 """No gripper is faster, m/s."""
 
 GRIPPER_REACH: Final = 0.03
 """How near to an object or its place a gripper can close or open, m."""
-
-MEASURES: Final = (
-    "completion_time",
-    "human_idle",
-    "robot_idle",
-    "concurrent_activity",
-    "functional_delay",
-    "conflicts",
-    "goals_lost",
-    "decision_time",
-    "decision_fraction",
-    "decided",
-    "decided_rightly",
-)
 
 _IDLE_SPEED: Final = 0.01
 
@@ -170,8 +156,6 @@ class Team:
     def info(self, index: Mapping[str, int]) -> dict[str, Any]:
         """The part of ``info`` about belief and robot; ``inf`` where a measure is not known yet.
 
-        Not NaN, which is equal to nothing, not even to itself in the same episode played again.
-
         Args:
             index: Number of each object.
         """
@@ -183,14 +167,13 @@ class Team:
                 belief[index[goal]] = probability
         info: dict[str, Any] = {"belief": belief}
         if self.command is not None:
-            summary = self._metrics.summary()
-            info |= {name: summary[name] if math.isfinite(summary[name]) else math.inf for name in MEASURES}
+            info |= known_measures(self._metrics.summary())
             target = self.command.target
             info["robot_target"] = -1 if target is None else index.get(target, -1)
         return info
 
     def summary(self) -> dict[str, float]:
-        """Measures of the team so far, see :meth:`~legible_envs.tabletop.partner.fluency.TeamMetrics.summary`."""
+        """Measures of the team so far, see :meth:`~legible_envs.partner.fluency.TeamMetrics.summary`."""
         return self._metrics.summary()
 
     def _move(self, command: Command, game: TableGame) -> None:

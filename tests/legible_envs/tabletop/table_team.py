@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from legible_envs.partner.fluency import TeamMetrics, Tick, tick_of
 from legible_envs.tabletop import TabletopLayout, TabletopTask
-from legible_envs.tabletop.partner.fluency import TeamMetrics, Tick, tick_of
 from legible_envs.tabletop.partner.interface import Command, Senses
 from legible_envs.tabletop.partner.robot import RobotPartner
 

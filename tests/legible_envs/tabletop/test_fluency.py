@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from legible_envs.tabletop.partner.fluency import TeamMetrics, Tick, tick_of
+from legible_envs.partner.fluency import TeamMetrics, Tick, tick_of
 from legible_envs.tabletop.partner.interface import Command, Senses
 
 

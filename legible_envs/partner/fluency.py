@@ -9,13 +9,29 @@ robot was sure, whether rightly, and how often both wanted the same object.
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Iterable
+from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Final
 
-from legible_envs.tabletop.partner.interface import Command, Senses
+from legible_envs.partner.interface import TeamCommand, TeamSenses
 
-__all__ = ["ReachPrediction", "TeamMetrics", "Tick", "tick_of"]
+__all__ = ["MEASURES", "ReachPrediction", "TeamMetrics", "Tick", "known_measures", "tick_of"]
+
+MEASURES: Final = (
+    "completion_time",
+    "human_idle",
+    "robot_idle",
+    "concurrent_activity",
+    "functional_delay",
+    "conflicts",
+    "goals_lost",
+    "decision_time",
+    "decision_fraction",
+    "decided",
+    "decided_rightly",
+)
+"""The measures in ``info``, as :meth:`TeamMetrics.summary` names them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +65,7 @@ class Tick:
     lost: bool = False
 
 
-def tick_of(senses: Senses, command: Command, human_active: bool, lost: bool = False) -> Tick:
+def tick_of(senses: TeamSenses, command: TeamCommand, human_active: bool, lost: bool = False) -> Tick:
     """The line of a log for one step of a robot.
 
     Args:
@@ -69,6 +85,14 @@ def tick_of(senses: Senses, command: Command, human_active: bool, lost: bool = F
         conflict=command.conflict,
         lost=lost,
     )
+
+
+def known_measures(summary: Mapping[str, float]) -> dict[str, float]:
+    """The measures of a summary, as they stand in ``info``: ``inf`` where one is not known yet.
+
+    Not NaN, which is equal to nothing, not even to itself in the same episode played again.
+    """
+    return {name: summary[name] if math.isfinite(summary[name]) else math.inf for name in MEASURES}
 
 
 @dataclass(frozen=True, slots=True)
