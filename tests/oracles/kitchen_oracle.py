@@ -148,7 +148,8 @@ class OracleGame:
         if self.over:
             return set()
         near, held = self.reachable(player), self.held[player]
-        pots = [pot for cell, pot in self.pots.items() if cell in near]
+        in_use = set().union(*(self.reachable(other) for other in range(len(self.cells))))
+        pots = [pot for cell, pot in self.pots.items() if cell in in_use]  # what one cannot bring, another is handed
         stations = {cell: STATIONS[s] for cell, s in self.all_cells() if s in STATIONS}
         if held is None:
             wanted = {item for item in INGREDIENTS if any(self.accepts(pot, item) for pot in pots)}
