@@ -107,7 +107,7 @@ TRUSTED = {
     "benchmarks/throughput/study.py": {"json.loads"},  # answers of a server that this process started
     "benchmarks/study/bots/link.py": {"json.loads"},  # answers of a server that this process started
     "benchmarks/experiments/optimizers/run.py": {"json.loads"},  # a key that this process made
-    "benchmarks/experiments/learning/run.py": {"json.loads"},  # likewise
+    "benchmarks/experiments/learning/run.py": {"json.loads"},  # what the training before has just written
     "benchmarks/throughput/predictors_grid.py": {"json.loads"},  # answers of a process that this one started
     "benchmarks/throughput/peer_maxent_irl.py": {"numpy.load"},  # a file that the process which started it wrote
 }
