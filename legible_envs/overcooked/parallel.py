@@ -16,7 +16,7 @@ __all__ = ["OvercookedParallelEnv"]
 
 
 class OvercookedParallelEnv(TeamParallelEnv):
-    """One to four cooks in one kitchen, each an agent; made by :func:`.parallel_env`.
+    """One to four cooks in one kitchen, each an agent; made by :func:`~legible_envs.overcooked.learners.parallel_env`.
 
     The game is that of :class:`.OvercookedEnv` with as many players, which documents actions, observations and infos:
     agent ``player_i`` sees the kitchen as player ``i``, has its own ``goal_mask`` and ``action_mask`` in ``infos``, and

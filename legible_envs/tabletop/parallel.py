@@ -22,7 +22,9 @@ ROBOT: Final = "robot"
 
 
 class TabletopParallelEnv(TeamParallelEnv):
-    """A person and a robot who build together, each an agent; made by :func:`.parallel_env`.
+    """A person and a robot who build together, each an agent.
+
+    Made by :func:`~legible_envs.tabletop.learners.parallel_env`.
 
     The game is that of :class:`.TabletopEnv`, which documents rewards and infos. Both agents get the team's reward, and
     all measures of the team in their infos. So a learned robot stands beside ``partner="robot"``, which waits until it
