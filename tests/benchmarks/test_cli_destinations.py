@@ -43,7 +43,7 @@ def test_every_path_is_read_and_must_exist_or_is_a_checked_destination() -> None
     assert writing == {("optimize",), ("score",), ("show",), ("play",), ("humans", "fetch"), ("humans", "evaluate"),
                        ("sweep",), ("reproduce",), ("demo",), ("bench",),
                        ("study", "new"), ("study", "export"), ("study", "analyse"), ("study", "replay"),
-                       ("study", "hand-out"), ("study", "progress")}  # fmt: skip
+                       ("study", "hand-out"), ("study", "progress"), ("train",), ("datasets", "make")}  # fmt: skip
 
 
 @pytest.mark.parametrize("there", ["file/inside", "file/deep/inside", "/proc/inside", "/dev/null/inside", "link/inside",
