@@ -43,7 +43,7 @@ TINY = Settings(
     shares=(0.6, 1.0),
     curve_repeats=1,
     shape=(5, 5),
-    team_participants=1,
+    team_participants=0,  # they play for minutes; see test_overcooked_teams
 )
 
 

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pandas as pd
 import pytest
 
 from benchmarks.experiments.overcooked import teams
 from benchmarks.experiments.overcooked.sweep import CONDITIONS, QUICK, WALKERS, people_of
 
+SETTINGS = replace(QUICK, team_participants=2)
 ROOM = "XOXXTXX\nX     F\nX  1  X\nX     D\nXCPXXSX"
 
 
 def trials_of(condition="Legible", layout=0):
     places = [{"condition": condition, "layout": layout, "drawing": ROOM}]
-    return teams.team_trials(QUICK, places, people_of(pd.DataFrame()))
+    return teams.team_trials(SETTINGS, places, people_of(pd.DataFrame()))
 
 
 def test_every_robot_meets_the_same_participants() -> None:
@@ -33,7 +36,7 @@ def test_what_is_logged_becomes_a_table_and_words() -> None:
             for trial in trials_of(condition, layout)[:5]:
                 if condition == "Legible" or trial["robot"] in (teams.ALONE, "Eq. 1 (hard)"):
                     played = teams.play_with_robot(trial)
-                    assert len(played) == QUICK.team_participants
+                    assert len(played) == SETTINGS.team_participants
                     assert all(row["deliveries"] == 3 for row in played)
                     assert ("conflicts" in played[0]) == (trial["robot"] != teams.ALONE)
                     keys = {key: trial[key] for key in ("condition", "layout", "walker", "robot")}

@@ -69,7 +69,8 @@ def reproduce(
     places: Rows = layouts[layouts["table"] == "layout"].to_dict("records")  # type: ignore[assignment]
     log("readings", evaluate_predictor, accuracy_trials(settings, places, people), "people")
     log("curves", trace_learning_curve, curve_trials(settings, places, people), "people")
-    log("teams", play_with_robot, team_trials(settings, places, people), "people")
+    if settings.team_participants:
+        log("teams", play_with_robot, team_trials(settings, places, people), "people")
 
 
 def _num_recorded() -> int:

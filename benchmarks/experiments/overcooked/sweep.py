@@ -96,7 +96,8 @@ class Settings:
         curve_repeats: Splits of the learning curves.
         shape: Rows and columns of the kitchens.
         seed: Of the participants and splits.
-        team_participants: Simulated participants per layout and kind of walker who cook with each robot.
+        team_participants: Simulated participants per layout and kind of walker who cook with each robot. 0: none,
+            as in quick runs.
     """
 
     layouts: int = 5
@@ -123,7 +124,7 @@ QUICK: Final = Settings(
     repeats=1,
     shares=(0.3, 1.0),
     curve_repeats=2,
-    team_participants=2,
+    team_participants=0,
 )
 
 
