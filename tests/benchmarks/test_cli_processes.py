@@ -138,7 +138,9 @@ def test_ctrl_c_during_a_search_says_how_to_go_on(folder: Path) -> None:
                                stderr=subprocess.PIPE, text=True, cwd=folder, start_new_session=True,
                                preexec_fn=hear_ctrl_c)  # fmt: skip
     deadline = time.monotonic() + 200
-    while not (folder / "run" / "metrics.csv").exists() and time.monotonic() < deadline:
+    metrics = folder / "run" / "metrics.csv"
+    # Two rows: the search is under way, and not merely about to begin.
+    while not (metrics.exists() and metrics.read_text().count("\n") > 2) and time.monotonic() < deadline:
         time.sleep(0.1)
     process.send_signal(signal.SIGINT)
     _, error = process.communicate(timeout=200)

@@ -363,7 +363,6 @@ def test_ctrl_c_from_outside_leaves_a_usable_run(tmp_path):
     program = textwrap.dedent("""
         import sys
         from tests.support.shelf_workspace import ShelfWorkspace
-from tests.support.signals import hear_ctrl_c
         from optimizers import search
         started = lambda state: state.iteration == 5 and print("running", flush=True)
         search(ShelfWorkspace(), evaluations=10**9, checkpoint=sys.argv[1], callbacks=[started],
