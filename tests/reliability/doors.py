@@ -29,6 +29,7 @@ from legible_envs.overcooked.humans import (
 from legible_envs.overcooked.humans import simulate_participants as simulate_cooks
 from legible_envs.overcooked.humans.planner_fitting import fit_planner
 from legible_envs.overcooked.layout import FLOOR
+from legible_envs.overcooked.partner.needs import put_away_cells, shared_counters
 from legible_envs.overcooked.policies import ScriptedPlayer, WalkingPlayer
 from legible_envs.rollouts.trajectory import Trajectory
 from legible_envs.tabletop import TabletopLayout, TabletopWorkspace
@@ -36,7 +37,7 @@ from legible_envs.tabletop.geometry.paths import ShortestPaths
 from legible_envs.tabletop.humans import Person, simulate_reach
 from legible_envs.tabletop.humans import simulate_participants as simulate_reachers
 from legible_envs.tabletop.partner.belief import GoalBelief
-from predictors import TimeSeriesGaussian, make_predictor
+from predictors import BehaviourCloning, TimeSeriesGaussian, make_predictor
 from tests.reliability.compiled_functions import called, kernels, takes_generator
 from tests.support.rough_hands import SPEEDS, RoughHand, rough_table
 
@@ -217,6 +218,44 @@ def transitions(chaos: Chaos) -> None:
     predict_transitions(layout, states, chaos.array(chaos.rng.integers(6, size=(count, 2))), rules)
 
 
+def teams(chaos: Chaos) -> None:
+    """A person beside a robot, and two cooks who must hand things over."""
+    divided = "XXXXXXX\nT 1X  P\nO  X 2D\nC  X  S\nF  X  X\nX  X  X\nXXXXXXX"
+    layout = kitchen_designs()[0].decode(chaos.one(tuple(genomes_of(kitchen_designs()[0])[:5])))
+    for kitchen_layout, arguments in (
+        (layout, {"partner": "robot"}),
+        (divided, {"partner": "robot"}),
+        (divided, {"num_players": 2}),
+    ):
+        env: Any = gymnasium.make("LegibleOvercooked-v0", layout=kitchen_layout, obs_type="vector", **arguments)
+        _, info = env.reset(seed=0)
+        person = ScriptedPlayer(env, chaos.rng) if "partner" in arguments else None
+        for step in range(600 if chaos.good else 20):
+            scripted = person is not None and step % 200 < 120  # at other times anything
+            action = person(None, info) if scripted else env.action_space.sample()
+            _, _, terminated, truncated, info = env.step(action)
+            if terminated or truncated:
+                _, info = env.reset()
+        env.step(chaos.array(np.array([1, 5]) if person is None else np.array([5])))
+        state, kitchen_vector, rules = env.unwrapped.arrays()
+        cells = np.zeros(layout.cells.size, dtype=np.bool_)
+        shared_counters(state, kitchen_vector, rules, cells)
+        put_away_cells(state, kitchen_vector, rules, 1, int(chaos.rng.integers(1, 6)), cells)
+
+
+def clones(chaos: Chaos) -> None:
+    """People's steps are learned, and inverted."""
+    recorded = list(walks())
+    cloning = BehaviourCloning().fit(recorded)
+    cloning.predict_proba([changed(recorded, chaos)] if not chaos.good else recorded)
+    simulate_cooks(recorded[0].layout, 2, chaos.rng, population="cloned")
+    env: Any = gymnasium.make("LegibleOvercooked-v0", layout=recorded[0].layout)
+    _, info = env.reset(seed=0)
+    player = WalkingPlayer(env, cloning.walker(), chaos.rng)
+    for _ in range(20):
+        info = env.step(player(None, info))[4]
+
+
 @cache
 def walks() -> tuple[Trajectory, ...]:
     ws, rng = kitchen_designs()[0], np.random.default_rng(2)
@@ -258,7 +297,15 @@ def predict(predictors: Sequence[Any], recorded: Sequence[Trajectory], chaos: Ch
 
 
 def grid_predictors(chaos: Chaos) -> None:
-    names = ("bayesian", "maxent-irl", "shortest-distance", "grid-knn", "grid-logistic", "grid-ngram")
+    names = (
+        "bayesian",
+        "maxent-irl",
+        "shortest-distance",
+        "grid-knn",
+        "grid-logistic",
+        "grid-ngram",
+        "behaviour-cloning",
+    )
     predict([make_predictor(name) for name in names], walks(), chaos)
 
 
@@ -330,6 +377,8 @@ DOORS: tuple[tuple[Callable[[Chaos], None], int], ...] = (
     (kitchen, 2),
     (kitchens, 2),
     (transitions, 20),
+    (teams, 1),
+    (clones, 1),
     (walkers, 5),
     (fits, 10),
     (grid_predictors, 1),
