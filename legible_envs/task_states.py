@@ -305,9 +305,11 @@ def _steps_between(classes: Sequence[SubtaskClass]) -> int:
     steps lead the person nowhere.
     """
     whole = math.prod(cls.count + 1 for cls in classes)
+    endings = [cls.endings for cls in classes]
+    num_steps = [len(ways) or 1 for ways in endings]
     leading: dict[str, list[int]] = defaultdict(list)
-    for i, cls in enumerate(classes):
-        for place in {place for _, place in cls.endings}:
+    for i, ways in enumerate(endings):
+        for place in {place for _, place in ways}:
             leading[place].append(i)
     unfinished = [whole // (cls.count + 1) * cls.count for cls in classes]
     steps = 0
@@ -315,7 +317,7 @@ def _steps_between(classes: Sequence[SubtaskClass]) -> int:
         none = whole // math.prod(classes[i].count + 1 for i in there)
         for i, cls in enumerate(classes):
             without = none if i in there else none // (cls.count + 1) * cls.count
-            steps += (len(cls.endings) or 1) * (unfinished[i] - without)
+            steps += num_steps[i] * (unfinished[i] - without)
         if steps > MAX_STEPS:
             break
     return steps
