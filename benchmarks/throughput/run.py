@@ -21,7 +21,7 @@ from benchmarks.throughput.predictors_reaching import reach_speed
 from benchmarks.throughput.study import study_speed
 from benchmarks.throughput.sweep import FULL, OPTIMUM_5X5, QUICK, Settings
 from benchmarks.throughput.tabletop import table_drawing, table_games, table_people, table_scoring, table_searching
-from benchmarks.throughput.teams import team_games
+from benchmarks.throughput.teams import steps_of, team_games, ticks_of
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -191,8 +191,8 @@ def games(settings: Settings, peer: Peer | None = None) -> list[Figure]:
     envs = gym.make_vec("LegibleOvercooked-v0", num_envs=settings.num_envs, vectorization_mode="vector_entry_point",
                         layout=layouts[0].to_ascii())  # fmt: skip
     samplers = {
-        "env": lambda: rate(_player(env, rng), settings.seconds),
-        "vector env": lambda: rate(_players(envs, rng), settings.seconds),
+        "env": lambda: rate(steps_of(env, rng), settings.seconds),
+        "vector env": lambda: rate(ticks_of(envs, rng), settings.seconds),
         "reset": lambda: 1 / rate(_resetter(env, layouts), settings.seconds),
     }
     if peer is not None:
@@ -216,33 +216,6 @@ def games(settings: Settings, peer: Peer | None = None) -> list[Figure]:
             figures.append(own.over(bare, f"{own.key} / peer", f"{name} over Overcooked-AI without observations"))
             figures.append(own.over(observed, f"{own.key} / observed", f"{name} over Overcooked-AI with observations"))
     return figures
-
-
-def _player(env: Any, rng: np.random.Generator) -> Callable[[], int]:
-    """A thousand random actions, episodes restarted as they end."""
-    actions = rng.integers(6, size=1_000).tolist()
-    env.reset(seed=0)
-
-    def play() -> int:
-        for action in actions:
-            _, _, terminated, truncated, _ = env.step(action)
-            if terminated or truncated:
-                env.reset()
-        return len(actions)
-
-    return play
-
-
-def _players(envs: Any, rng: np.random.Generator) -> Callable[[], int]:
-    actions = rng.integers(6, size=(100, envs.num_envs))
-    envs.reset(seed=0)
-
-    def play() -> int:
-        for joint in actions:
-            envs.step(joint)
-        return int(actions.size)
-
-    return play
 
 
 def _resetter(env: Any, layouts: list[Any]) -> Callable[[], int]:

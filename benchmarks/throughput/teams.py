@@ -1,4 +1,7 @@
-"""Speed of kitchens with several cooks, in steps of agents: ``P`` of them in every tick of ``P`` cooks."""
+"""Speed of kitchens with several cooks, in steps of agents: ``P`` of them in every tick of ``P`` cooks.
+
+The loops that play are those of one cook, too.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,7 @@ from benchmarks.throughput.measure import Figure, alternate, rate
 if TYPE_CHECKING:
     from benchmarks.throughput.sweep import Settings
 
-__all__ = ["team_games"]
+__all__ = ["steps_of", "team_games", "ticks_of"]
 
 _COOKS = 2
 
@@ -26,11 +29,10 @@ def team_games(settings: Settings) -> list[Figure]:
 
     rng = np.random.default_rng(0)
     alone = gym.make("LegibleOvercooked-v0").unwrapped
-    alone.reset(seed=0)
-    samplers: dict[str, Callable[[], float]] = {"alone": partial(rate, _turns(alone, rng), settings.seconds)}
+    samplers: dict[str, Callable[[], float]] = {"alone": partial(rate, steps_of(alone, rng), settings.seconds)}
     for obs_type in ("grid", "vector"):
         envs = gym.make_vec("LegibleOvercooked-v0", num_envs=settings.num_envs, num_players=_COOKS, obs_type=obs_type)
-        samplers[f"cooks {obs_type}"] = partial(rate, _ticks(envs, rng), settings.seconds)
+        samplers[f"cooks {obs_type}"] = partial(rate, ticks_of(envs, rng), settings.seconds)
     agents = _agents(rng)
     if agents is not None:
         samplers["agents"] = partial(rate, agents, settings.seconds)
@@ -51,7 +53,8 @@ def team_games(settings: Settings) -> list[Figure]:
     return figures
 
 
-def _ticks(envs: Any, rng: np.random.Generator) -> Callable[[], int]:
+def ticks_of(envs: Any, rng: np.random.Generator) -> Callable[[], int]:
+    """A hundred random joint actions in a vector of games; how many actions of players those are."""
     actions = rng.integers(6, size=(100, *envs.action_space.shape))
     envs.reset(seed=0)
 
@@ -63,12 +66,15 @@ def _ticks(envs: Any, rng: np.random.Generator) -> Callable[[], int]:
     return play
 
 
-def _turns(env: Any, rng: np.random.Generator) -> Callable[[], int]:
+def steps_of(env: Any, rng: np.random.Generator) -> Callable[[], int]:
+    """A thousand random actions in one game of one cook, episodes restarted as they end."""
     actions = rng.integers(6, size=1_000).tolist()
+    env.reset(seed=0)
 
     def play() -> int:
         for action in actions:
-            if env.step(action)[2]:
+            _, _, terminated, truncated, _ = env.step(action)
+            if terminated or truncated:
                 env.reset()
         return len(actions)
 

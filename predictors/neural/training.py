@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from legible_envs.support.optional import import_torch
 from predictors.neural.networks import Network, Operations, Weights
 
 __all__ = ["Examples", "Training", "require_torch", "train"]
@@ -21,14 +22,9 @@ def require_torch() -> Any:
     Raises:
         ImportError: It is not installed; the message says how to.
     """
-    try:
-        import torch
-    except ImportError as error:
-        raise ImportError(
-            "training a neural predictor needs PyTorch, which is not installed: pip install legible-envs[torch] "
-            f"(a fitted one that was saved is loaded and used without it). The import said: {error}"
-        ) from error
-    return torch
+    return import_torch(
+        "training a neural predictor needs", "a fitted one that was saved is loaded and used without it"
+    )
 
 
 class Examples(NamedTuple):

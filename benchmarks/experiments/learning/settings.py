@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Final
 
 from legible_envs.support.models import FileModel, Flag, Length, Real, Text, Whole, validated
+from legible_envs.support.optional import import_torch
 from legible_envs.support.validation import shown
 
 __all__ = ["Environment", "NetworkShape", "PPOSettings", "TrainingSettings", "changed", "require_torch"]
@@ -184,10 +185,4 @@ def require_torch() -> None:
     Raises:
         ImportError: It is not installed; the message says how to.
     """
-    try:
-        import torch  # noqa: F401
-    except ImportError as error:
-        raise ImportError(
-            "training needs PyTorch, which is not installed: pip install legible-envs[torch] (a trained policy plays "
-            f"without it). The import said: {error}"
-        ) from error
+    import_torch("training needs", "a trained policy plays without it")

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, get_args
 import numpy as np
 import numpy.typing as npt
 
+from legible_envs.support.optional import import_torch
 from legible_envs.support.validation import choice
 from legible_envs.tabletop.scoring.exact_kernels import ReachTables
 from legible_envs.tabletop.scoring.scorer import TabletopScorer
@@ -43,14 +44,7 @@ def require_torch() -> Any:
     Raises:
         ImportError: It is not installed; the message says how to.
     """
-    try:
-        import torch
-    except ImportError as error:
-        raise ImportError(
-            "gradients of a table need PyTorch, which is not installed: pip install legible-envs[torch] "
-            f"(scores and searches without gradients do without it). The import said: {error}"
-        ) from error
-    return torch
+    return import_torch("gradients of a table need", "scores and searches without gradients do without it")
 
 
 class DifferentiableTable:
